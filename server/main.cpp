@@ -23,6 +23,7 @@
 
 #include "common/options/config.h"
 #include "common/version.h"
+#include "common/wall_clock.h"
 #include "server/command_line.h"
 #include "server/door_losses.h"
 #include "server/egress/egress.h"
@@ -194,9 +195,7 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
 constexpr int kDegraded = 3;
 
 std::uint64_t MillisecondsSince1970() {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(
-      std::max<std::int64_t>(1, std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count()));
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(1, WallClock() / kNanosPerMillisecond));
 }
 
 // A later start may succeed if another server used the store or the disk failed. A newer or damaged store stays so.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "common/wall_clock.h"
 #include "server/slam/site_options_of.h"
 
 namespace cairn::server {
@@ -19,11 +20,6 @@ constexpr auto kHousekeepingPeriod = std::chrono::milliseconds(100);
 
 std::size_t ThreadCount(std::int64_t wanted) {
   return wanted > 0 ? static_cast<std::size_t>(wanted) : std::max(1U, std::thread::hardware_concurrency());
-}
-
-Stamp ServerClock() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 }  // namespace
@@ -39,7 +35,7 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       atlas_(options.maps, options.slam.grid.resolution_m, options.server.create_sites, maps_pool_, outbound, journal,
              generation),
       roster_(options.robots, options.slam, robots_pool_, outbound, atlas_, journal),
-      jobs_(options.jobs, outbound, ServerClock, journal),
+      jobs_(options.jobs, outbound, WallClock, journal),
       smooth_(options.jobs, SiteOptionsOf(options.slam), roster_, atlas_, journal, &jobs_),
       relocalise_(options.jobs, SiteOptionsOf(options.slam), roster_, atlas_, smooth_),
       worker_(options.jobs, jobs_,

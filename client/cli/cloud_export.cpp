@@ -73,7 +73,7 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
       "  cairn cloud export robot1.log --trajectory robot1.tum --height 0.4 -o hall.ply --truth-world hall3d");
   auto arguments = std::make_shared<CloudArguments>();
   CloudExportOptions& options = arguments->options;
-  command->add_option("log", options.log, "CARMEN or DP-SLAM log with the scans")->required();
+  command->add_option("log", options.log, "Log, ROS 2 bag or recording with the scans")->required();
   command->add_option("-o,--output", options.output, "File to write: .ply or .pcd")->required()->type_name("FILE");
   command->add_option("--robot", arguments->robot, "The robot whose path is asked from the server");
   command->add_flag("--smoothed", arguments->smoothed,

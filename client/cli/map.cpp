@@ -77,15 +77,18 @@ ExitCode ExportMap(Program& program, const ExportArguments& arguments) {
                                    "." + arguments.image, options);
     if (!saved) return program.Refuse(saved.error());
   }
-  const std::string image = fs::path(arguments.file).replace_extension(arguments.image).string();
-  return program.Print(fmt::format("{} and {}: {} x {} cells of {} m\n", arguments.file, image, map->width, map->height,
-                                   map->resolution_m),
-                       {{"file", arguments.file},
-                        {"width", map->width},
-                        {"height", map->height},
-                        {"resolution_m", map->resolution_m},
-                        {"frame", arguments.frame},
-                        {"keep_out", arguments.keep_out}});
+  const auto with_image = [&](const std::string& file) {
+    return file + " and " + fs::path(file).replace_extension(arguments.image).string();
+  };
+  std::string text = fmt::format("{}: {} x {} cells of {} m\n", with_image(arguments.file), map->width, map->height,
+                                 map->resolution_m);
+  if (!arguments.keep_out.empty()) text += with_image(arguments.keep_out) + ": the areas where robots must not drive\n";
+  return program.Print(text, {{"file", arguments.file},
+                              {"width", map->width},
+                              {"height", map->height},
+                              {"resolution_m", map->resolution_m},
+                              {"frame", arguments.frame},
+                              {"keep_out", arguments.keep_out}});
 }
 
 struct EnableArguments {
@@ -123,9 +126,10 @@ void AddMapExport(CLI::App& map, Program& program) {
       ->check(CLI::IsMember({"trinary", "scale", "raw"}))
       ->capture_default_str();
   command
-      ->add_option("--keep-out", arguments->keep_out,
-                   "Also write the areas where robots must not drive, as the mask of Nav2's keepout filter. It is as "
-                   "large as the map: what lies beyond is not in it")
+      ->add_option(
+          "--keep-out", arguments->keep_out,
+          "Also write the areas where robots must not drive, as the mask of Nav2's keepout filter: this yaml file "
+          "and an image beside it. The mask is as large as the map: what lies beyond is not in it")
       ->type_name("FILE");
   AddFrame(*command, arguments->frame);
   program.OnChosen(*command, arguments, ExportMap);

@@ -122,7 +122,7 @@ void AddKind(CLI::App& edit, Program& program, MapEditKind kind, const std::stri
   command->add_option("--site", arguments->site, "The site's name")->required();
   const int most = static_cast<int>(kMostEditPoints);
   auto* shape = command->add_option_group("shape", "Where, in metres of the map's frame");
-  AddPoints(*shape, "--box", arguments->box, 2, 2, "Two opposite corners of a box");
+  AddPoints(*shape, "--box", arguments->box, 2, 2, "Two opposite corners of a box, such as 8,0 10,3");
   AddPoints(*shape, "--area", arguments->area, 3, most, "The corners of an area, in order");
   auto* line = AddPoints(*shape, "--line", arguments->line, 2, most, "The points of a line");
   shape->require_option(1);

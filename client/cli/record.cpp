@@ -21,6 +21,7 @@
 #include "client/cli/recorder.h"
 #include "client/cli/ros2_source.h"
 #include "client/lib/map_client.h"
+#include "common/wall_clock.h"
 
 namespace cairn::client {
 namespace {
@@ -39,11 +40,6 @@ struct RecordArguments {
   double map_every_s = 5.0;
   double buffer_mib = 64.0;
 };
-
-std::int64_t NowNs() {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(since_1970).count();
-}
 
 // The map of one site, written when it has changed, and not too often.
 class RecordedMap {
@@ -66,7 +62,7 @@ class RecordedMap {
     const auto image = AssembleTiles(tiles, info->resolution_m * (1 << level));
     if (!image) return SayOnce(file, "the map cannot be recorded: " + image.error().message);
     if (image->cells.empty()) return {};
-    return file.Add(site_, *image, NowNs());
+    return file.Add(site_, *image, WallClock());
   }
 
  private:
@@ -81,7 +77,7 @@ class RecordedMap {
   }
   [[nodiscard]] Result<void> SayOnce(RecordingFile& file, const std::string& text) {
     if (std::exchange(said_, true)) return {};
-    return file.AddLog(bag::LogLevel::kWarning, site_, text, NowNs());
+    return file.AddLog(bag::LogLevel::kWarning, site_, text, WallClock());
   }
 
   const std::string site_;
@@ -128,7 +124,7 @@ class Recording {
     constexpr std::chrono::milliseconds kWait{50};
     if (auto taken = TakeAll(kWait); !taken) return taken;
     if (auto written = WriteMaps(false); !written) return written;
-    return file_->EndOldChunk(NowNs());
+    return file_->EndOldChunk(WallClock());
   }
 
   [[nodiscard]] Result<void> End() {
@@ -138,7 +134,7 @@ class Recording {
     if (auto taken = TakeAll(std::chrono::milliseconds(0)); !taken) return taken;
     if (auto written = WriteMaps(true); !written) return written;
     if (const std::string losses = Losses(); !losses.empty())
-      if (auto said = file_->AddLog(bag::LogLevel::kWarning, "recorder", losses, NowNs()); !said) return said;
+      if (auto said = file_->AddLog(bag::LogLevel::kWarning, "recorder", losses, WallClock()); !said) return said;
     return file_->Finish();
   }
 

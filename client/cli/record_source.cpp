@@ -1,8 +1,9 @@
 #include "client/cli/record_source.h"
 
-#include <chrono>
 #include <type_traits>
 #include <utility>
+
+#include "common/wall_clock.h"
 
 namespace cairn::client {
 
@@ -52,9 +53,8 @@ Result<void> RecordSource::Subscribe(wire::Bus& bus, int number, Wire& wire) {
 
 template <typename Value>
 void RecordSource::OnValue(int number, Value&& value) {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   RecordEvent event;
-  event.time = std::chrono::duration_cast<std::chrono::nanoseconds>(since_1970).count();
+  event.time = WallClock();
   if constexpr (std::is_same_v<Value, ScanSample> || std::is_same_v<Value, OdometrySample>) {
     if (!options_.robots.empty() && options_.robots.count(value.stream.robot_id) == 0) return;
   }

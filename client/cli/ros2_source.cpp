@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/wall_clock.h"
+
 namespace cairn::client {
 namespace {
 
@@ -171,9 +173,8 @@ void Ros2Source::Keep(Subscriptions& subscriptions, const std::string& topic, co
 
 template <typename Sample>
 void Ros2Source::Push(Sample&& sample) {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   RecordEvent event;
-  event.time = std::chrono::duration_cast<std::chrono::nanoseconds>(since_1970).count();
+  event.time = WallClock();
   event.value = std::forward<Sample>(sample);
   queue_.Push(std::move(event));
 }

@@ -61,9 +61,9 @@ std::string FormatJob(const Job& job) {
 }
 
 std::string FormatRobot(const RobotStatus& robot) {
-  std::string text =
-      fmt::format("{} in {}: {}{}\n", robot.session.robot, robot.session.site, SessionPhaseName(robot.session.phase),
-                  robot.alive ? ", connected" : ", not connected");
+  std::string text = fmt::format("{} in {}: {}{}{}\n", robot.session.robot, robot.session.site,
+                                 SessionPhaseName(robot.session.phase), robot.alive ? ", connected" : ", not connected",
+                                 robot.session.localise_only ? ", only localised" : "");
   if (!robot.session.status.ok()) {
     text += fmt::format("  {}: {}\n", StatusCodeName(robot.session.status.code), robot.session.status.message);
   }
@@ -103,14 +103,14 @@ std::string FormatLoad(const ServerLoad& now, const ServerLoad* before) {
     text += fmt::format("{:.0f} % of a processor, ",
                         100.0 * (now.processor_s - since.processor_s) / (now.up_s - since.up_s));
   }
-  text += fmt::format("{:.0f} MiB of memory, {} values wait in it", static_cast<double>(now.memory_bytes) / kMib,
+  text += fmt::format("{:.0f} MiB of memory, {} values queued", static_cast<double>(now.memory_bytes) / kMib,
                       now.inbound_waiting + now.outbound_waiting);
   if (now.strand_wait_p99_ms > 0.0) {
-    text += fmt::format(", work waits {:.1f} ms for a thread (p99 {:.1f} ms)", now.strand_wait_p50_ms,
-                        now.strand_wait_p99_ms);
+    text +=
+        fmt::format(", a thread free after {:.1f} ms (p99 {:.1f} ms)", now.strand_wait_p50_ms, now.strand_wait_p99_ms);
   }
   if (now.stores) {
-    text += fmt::format("; on the disk after {:.0f} ms (p99 {:.0f} ms), {:.0f} MiB there", now.stored_after_p50_ms,
+    text += fmt::format("; stored after {:.0f} ms (p99 {:.0f} ms), {:.0f} MiB on the disk", now.stored_after_p50_ms,
                         now.stored_after_p99_ms, static_cast<double>(now.store_bytes) / kMib);
   }
   return text + "\n";

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/sensor/stamp.h"
+
 namespace cairn::client {
 namespace {
 
@@ -79,7 +81,9 @@ std::optional<StreamedSample> Decode(bool is_scan, const std::string& bytes) {
 
 Pose2 PoseAt(const Odometry& before, const Odometry& after, Stamp stamp) {
   if (after.stamp <= before.stamp) return after.T_odom_robot;
-  const double share = static_cast<double>(stamp - before.stamp) / static_cast<double>(after.stamp - before.stamp);
+  // A broken clock may be anywhere in int64.
+  const double share = static_cast<double>(NanosBetween(before.stamp, stamp)) /
+                       static_cast<double>(NanosBetween(before.stamp, after.stamp));
   return Interpolate(before.T_odom_robot, after.T_odom_robot, share);
 }
 

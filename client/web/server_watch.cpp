@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/wall_clock.h"
+
 namespace cairn::web {
 namespace {
 
 std::int64_t NowMs() {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count();
+  return WallClock() / kNanosPerMillisecond;
 }
 
 bool IsOdometry(const Ledger& ledger) {

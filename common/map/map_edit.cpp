@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "common/code_points.h"
 #include "common/options/number_text.h"
 
 namespace cairn {
@@ -35,24 +36,10 @@ double Surface(Points corners) {
 
 // Well-formed UTF-8 (RFC 3629) without control characters, which could do anything in the terminal of somebody else.
 bool IsPrintable(std::string_view text) {
-  static constexpr std::array<std::uint32_t, 5> kLeast = {0, 0x20, 0xa0, 0x800, 0x10000};  // By the number of bytes.
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<std::uint8_t>(text[i]);
-    std::size_t bytes = 0;
-    if (lead < 0x80) bytes = 1;
-    if (lead >> 5 == 0x06) bytes = 2;
-    if (lead >> 4 == 0x0e) bytes = 3;
-    if (lead >> 3 == 0x1e) bytes = 4;
-    if (bytes == 0 || i + bytes > text.size()) return false;
-    std::uint32_t code = bytes == 1 ? lead : lead & (0x7fU >> bytes);
-    for (std::size_t k = 1; k < bytes; ++k) {
-      const auto next = static_cast<std::uint8_t>(text[i + k]);
-      if (next >> 6 != 0x02) return false;
-      code = code << 6 | (next & 0x3fU);
-    }
-    const bool is_surrogate = code >= 0xd800 && code <= 0xdfff;
-    if (code < kLeast.at(bytes) || code == 0x7f || is_surrogate || code > 0x10ffff) return false;
-    i += bytes;
+  while (!text.empty()) {
+    const CodePoint first = FirstCodePoint(text);
+    if (first.bytes == 0 || IsControl(first.value)) return false;
+    text.remove_prefix(first.bytes);
   }
   return true;
 }

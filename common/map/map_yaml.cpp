@@ -179,7 +179,9 @@ Result<void> SaveMapYaml(const OccupancyImage& image, const std::filesystem::pat
   std::filesystem::path image_path = yaml_path;
   image_path.replace_extension(image_extension);
   if (image_path == yaml_path) {
-    return Fail(StatusCode::kInvalidArgument, yaml_path.string() + " must not end in " + image_extension);
+    return Fail(StatusCode::kInvalidArgument, yaml_path.string() + ": name the yaml file, such as " +
+                                                  std::filesystem::path(yaml_path).replace_extension(".yaml").string() +
+                                                  "; the image is written beside it");
   }
   const std::string_view content(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   if (auto written = WriteFileAtomically(image_path, content); !written) return written;

@@ -23,8 +23,7 @@ struct Mounting {
 // - The stamp of ROS is that of the first ray, and time_increment is the time between two of them: Cairn's meaning.
 //   Drivers that say a longer turn than scan_time mean scan_time.
 // - REP 117: -Inf is an object that is too near, NaN no measurement, +Inf nothing up to range_max. Finite ranges
-// outside
-//   range_min..range_max are to be discarded, also those beyond range_max.
+//   outside range_min..range_max are to be discarded, also those beyond range_max.
 [[nodiscard]] Scan ScanOf(LaserScan&& message, const Mounting& mounting);
 
 }  // namespace cairn::ros2

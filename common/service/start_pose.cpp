@@ -7,17 +7,24 @@
 
 namespace cairn {
 
+namespace {
+
+constexpr double kMostRadians = 1e6;  // A wrapped angle beyond has few digits left.
+
+}  // namespace
+
 Result<void> ValidateStart(const Pose2& T_map_robot_start) {
   constexpr double kFarthest_m = 1e6;
   const Pose2& start = T_map_robot_start;
   if (!start.IsFinite() || std::abs(start.x) > kFarthest_m || std::abs(start.y) > kFarthest_m) {
     return Fail(StatusCode::kInvalidArgument, "the start pose is not finite or more than 1000 km away");
   }
+  if (std::abs(start.theta) > kMostRadians)
+    return Fail(StatusCode::kInvalidArgument, "the heading of the start pose is more than a million radians");
   return {};
 }
 
 Result<Pose2> ParseStart(const std::string& text) {
-  constexpr double kMostRadians = 1e6;  // A wrapped angle beyond has few digits left.
   const auto parts = SplitAtCommas(text);
   std::array<double, 3> values{};
   bool good = parts.size() == values.size();

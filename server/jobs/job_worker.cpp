@@ -1,10 +1,13 @@
 #include "server/jobs/job_worker.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <exception>
+#include <string>
 #include <utility>
 
 #include "server/ops/log_context.h"
@@ -97,8 +100,11 @@ void JobWorker::RunOne(const Ticket& ticket) {
   spdlog::info("job {}: started, {} of site {}", job->id, JobKindName(job->kind), job->site);
   const auto outcome = Work(*job, ticket.enable, *control);
   if (outcome) {
-    spdlog::info("job {}: succeeded, map version {}, disagreement {:.6f} -> {:.6f} m^2 ({})", job->id,
-                 outcome->map_version, outcome->cost_before, outcome->cost_after, outcome->message);
+    std::string made;
+    if (outcome->map_version > 0)
+      made = fmt::format(", map version {}, disagreement {:.0f} -> {:.0f} mm", outcome->map_version,
+                         1000.0 * std::sqrt(outcome->cost_before), 1000.0 * std::sqrt(outcome->cost_after));
+    spdlog::info("job {}: succeeded{} ({})", job->id, made, outcome->message);
     list_.Succeed(ticket.id, *outcome);
   } else {
     spdlog::info("job {}: ended without a result: {}", job->id, outcome.error().message);

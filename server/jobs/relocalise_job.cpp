@@ -92,6 +92,15 @@ tl::unexpected<Status> Cancelled() {
   return Fail(StatusCode::kCancelled, "cancelled");
 }
 
+// What robots have drawn since the last publication belongs to the map in which the robot is looked for.
+void PublishNow(Site& site) {
+  const auto done = std::make_shared<std::promise<void>>();
+  const auto published = done->get_future();
+  site.Publish();
+  site.Probe([done] { done->set_value(); });
+  static_cast<void>(published.wait_for(kPublishWithin));
+}
+
 }  // namespace
 
 Result<LookedFor> LookForRobot(const std::string& robot, std::span<const slam::RecentScan> scans,
@@ -115,15 +124,6 @@ Result<LookedFor> LookForRobot(const std::string& robot, std::span<const slam::R
   for (const slam::RankedPlaces::Place& one : ranked.places)
     looked.outcome.places.push_back({scans.back().scan->stamp, one.T_map_robot, one.score / sum});
   return looked;
-}
-
-// What robots have drawn since the last publication belongs to the map in which the robot is looked for.
-static void PublishNow(Site& site) {
-  const auto done = std::make_shared<std::promise<void>>();
-  const auto published = done->get_future();
-  site.Publish();
-  site.Probe([done] { done->set_value(); });
-  static_cast<void>(published.wait_for(kPublishWithin));
 }
 
 Result<JobOutcome> RelocaliseJob::Run(const Job& job, const JobControl& control) const {
@@ -165,6 +165,8 @@ Result<JobOutcome> RelocaliseJob::Run(const Job& job, const JobControl& control)
                job.robot + " --here x,y,theta` joins it";
   } else if ((*session)->record().localises()) {
     message += ": nothing was changed, because it is only localised and looks for itself in this map";
+  } else if ((*session)->record().phase() != SessionPhase::kActive) {
+    message += ": nothing was changed, because it is not connected, and its next scans would have to confirm it";
   } else {
     message +=
         ": nothing was changed, because it has sent no scan, was found or lost anew, or has itself found another place "

@@ -12,9 +12,9 @@ class StartJudgement {
   static constexpr double kFirstM = 8.0;  // Way on which they are made.
 
   // Takes the next comparison. Whether the start is to be refused: one that contradicts may be a coincidence, two in a
-  // row are none.
+  // row are none. Comparisons that tell nothing, as while the map is being switched, do not count.
   [[nodiscard]] bool Refuses(const GridAgreement& agreement) {
-    contradictions_ = agreement.Contradicts() ? contradictions_ + 1 : 0;
+    if (agreement.known()) contradictions_ = agreement.Contradicts() ? contradictions_ + 1 : 0;
     return contradictions_ >= kContradictions;
   }
 

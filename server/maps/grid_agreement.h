@@ -21,11 +21,15 @@ struct GridAgreement {
   [[nodiscard]] double contradicted_share() const {
     return compared == 0 ? 0.0 : static_cast<double>(contradicted) / static_cast<double>(compared);
   }
+  // Whether so much was compared that it tells something.
+  [[nodiscard]] bool known() const {
+    constexpr std::size_t kEnough = 100;
+    return compared >= kEnough;
+  }
   // Whether the robot must be elsewhere. What people and furniture leave is less than this (cairn-study starts).
   [[nodiscard]] bool Contradicts() const {
-    constexpr std::size_t kEnough = 100;
     constexpr double kShare = 0.33;
-    return compared >= kEnough && contradicted_share() >= kShare;
+    return known() && contradicted_share() >= kShare;
   }
 };
 

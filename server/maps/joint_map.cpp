@@ -246,8 +246,11 @@ JointMap::Cells JointMap::Sum(slam::ChunkKey key) const {
   const auto sum = found == chunks_.end() ? nullptr : SumOf(found->second, [](SessionId) { return true; });
   if (sum == nullptr && edits == edits_.end()) return nullptr;
   auto cells = std::make_shared<TileCells>();
-  for (std::size_t i = 0; i < cells->size(); ++i)
-    (*cells)[i] = sum == nullptr ? kUnknownCell : slam::OccupancyOf(sum->log_odds[i]);
+  if (sum == nullptr) {
+    cells->fill(kUnknownCell);
+  } else {
+    *cells = slam::OccupanciesOf(*sum);
+  }
   if (edits != edits_.end()) DrawOver(*edits->second, *cells);
   return AllUnknown(*cells) ? nullptr : cells;
 }

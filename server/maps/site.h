@@ -94,7 +94,7 @@ class Site : public std::enable_shared_from_this<Site> {
     SessionId session = 0;
     NameId robot = 0;
     std::weak_ptr<GridOwner> owner;
-    std::uint32_t epoch = 0;  // Of the map, as the session knows it.
+    std::uint32_t epoch = 0;  // Of the map, that the session was told last.
     bool fragment = false;    // What it draws is not shown until a map version joins it (RobotGrid::fragment).
     bool ended = false;
   };

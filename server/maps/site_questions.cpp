@@ -43,9 +43,7 @@ void Site::AskPartOf(SessionId session, int level, SnapshotDone done) {
   Run([session, level, done = Once<std::shared_ptr<const MapSnapshot>>(std::move(done))](Site& site) {
     std::map<TileKey, JointMap::Cells> finest;
     for (const auto& [key, chunk] : site.joint_.ChunksOf(session)) {
-      auto cells = std::make_shared<TileCells>();
-      for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(chunk->log_odds[i]);
-      finest.emplace(TileKey{0, key.x, key.y}, std::move(cells));
+      finest.emplace(TileKey{0, key.x, key.y}, std::make_shared<const TileCells>(slam::OccupanciesOf(*chunk)));
     }
     if (finest.empty()) return done(Fail(StatusCode::kNotFound, "the robot has drawn nothing"));
     TilePyramid pyramid;

@@ -10,6 +10,7 @@
 #include "common/service/request_id.h"
 #include "common/service/start_pose.h"
 #include "common/version.h"
+#include "common/wall_clock.h"
 #include "server/ops/log_context.h"
 #include "server/queries/answers.h"
 #include "server/queries/request_log.h"
@@ -292,8 +293,7 @@ std::optional<Answer> Desk::EditMap(const Request& asked) {
   const auto site = atlas_.Find(asked.site);
   if (site == nullptr) return ReplyTo(asked, {StatusCode::kNotFound, "no site '" + asked.site + "'"});
   Request request = asked;
-  request.edit.made =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  request.edit.made = WallClock();
   const auto answer = [answers = answers_, request](Result<std::uint64_t> edited) {
     const LogContext context(FieldsOf(request));
     Reply reply = ReplyTo(request, edited ? Status{} : edited.error());

@@ -228,10 +228,11 @@ Result<void> Roster::End(const std::string& robot, std::shared_ptr<Receipt> rece
   return {};
 }
 
-Result<void> Roster::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot,
+Result<void> Roster::Relocalise(const std::string& robot, std::optional<Pose2> T_map_robot,
                                 const std::shared_ptr<Receipt>& receipt) {
   if (T_map_robot) {
     if (auto valid = ValidateStart(*T_map_robot); !valid) return valid;
+    T_map_robot->theta = WrapAngle(T_map_robot->theta);
   }
   const auto session = FindOrFail(robot);
   if (!session) return tl::unexpected(session.error());

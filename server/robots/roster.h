@@ -87,7 +87,7 @@ class Roster {
   // NOT_FOUND without such a session.
   Result<void> End(const std::string& robot, std::shared_ptr<Receipt> receipt = nullptr);
   // See Session::Relocalise. NOT_FOUND without a session, INVALID_ARGUMENT for a pose that is not finite or absurd.
-  Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot,
+  Result<void> Relocalise(const std::string& robot, std::optional<Pose2> T_map_robot,
                           const std::shared_ptr<Receipt>& receipt = nullptr);
   // From now on the robot is only localised in the map of its site, or it maps again. NOT_FOUND without a session, or
   // without a map. See Session::Localise.

@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "common/wall_clock.h"
 #include "server/robots/roster.h"
 #include "server/store/crash_note.h"
 #include "server/store/restore_marks.h"
@@ -47,10 +48,6 @@ std::vector<std::size_t> LongestFirst(Store& store, const std::vector<SessionId>
   return indices;
 }
 
-std::int64_t SecondsSince1970() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 tl::unexpected<Status> StartGivenUp() {
   return Fail(StatusCode::kCancelled, "the start was given up");
 }
@@ -83,7 +80,7 @@ Result<void> Roster::Restore(StartControl& control) {
   if (driving && std::ranges::find(*ids, *driving) == ids->end()) driving.reset();  // It was not stored.
   auto marks = RestoreMarks::Read(
       journal_->store(),
-      {.restoring = CrashNote::Of(note(kRestoringNote)), .driving = driving, .now_s = SecondsSince1970()});
+      {.restoring = CrashNote::Of(note(kRestoringNote)), .driving = driving, .now_s = WallClock() / kNanosPerSecond});
   if (!marks) return tl::unexpected(marks.error());
   if (auto settled = marks->Settle(); !settled) return settled;
   std::error_code ignored;

@@ -31,8 +31,8 @@ void SessionEstimator::RefreshHypotheses(const PoseReport& report, bool in_known
     hypotheses = in_known_map ? std::vector<PoseHypothesis>{{report.stamp, report.T_map_robot, 1.0}}
                               : MostBelieved(pipeline_.mapper().belief(report.T_map_robot), report.stamp);
   } else {
-    // What a fragment finds by itself is a place in a frame of its own.
-    if (!fragment_) hypotheses = MostBelieved(pipeline_.mapper().UnconfirmedPlaces(), report.stamp);
+    // What a fragment finds in its own map is a place in a frame of its own.
+    if (!fragment_ || in_known_map) hypotheses = MostBelieved(pipeline_.mapper().UnconfirmedPlaces(), report.stamp);
     if (hypotheses.empty()) hypotheses = looked_for_;
   }
   record_.SetHypotheses(std::move(hypotheses));

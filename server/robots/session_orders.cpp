@@ -72,7 +72,11 @@ Result<void> Session::MapAgain(std::shared_ptr<Receipt> receipt) {
     return cairn::Fail(StatusCode::kFailedPrecondition,
                        "the robot is not joined with the map of its site: it can only open a new session");
   if (record_.localises() && !record_.snapshot().status.pose.localized)
-    return cairn::Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
+    return cairn::Fail(
+        StatusCode::kFailedPrecondition,
+        "the robot's place in the map is not known: it can map again once it is localized. Let it drive, "
+        "or say where it is: cairn robot relocalise " +
+            record_.state().robot + " --here X,Y,THETA");
   if (!queue_.Push(LocaliseWanted{nullptr, false, std::move(receipt)})) return TooMany();
   Schedule();
   return {};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/wall_clock.h"
 #include "server/inbound.h"
 
 namespace cairn::server {
@@ -350,9 +351,7 @@ bool SessionRecord::HasHadTime(Clock::time_point now) const {
 }
 
 std::uint64_t SessionRecord::MillisecondsNow() {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(
-      std::max<std::int64_t>(0, std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count()));
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, WallClock() / kNanosPerMillisecond));
 }
 
 std::uint64_t SessionRecord::quiet_since_ms() const {

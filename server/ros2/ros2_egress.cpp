@@ -6,6 +6,8 @@
 #include <chrono>
 #include <utility>
 
+#include "common/wall_clock.h"
+
 namespace cairn::server {
 namespace {
 
@@ -32,11 +34,6 @@ std::array<double, 36> InSpace(const Eigen::Matrix3d& covariance) {
     }
   }
   return in_space;
-}
-
-Stamp WallClock() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 }  // namespace

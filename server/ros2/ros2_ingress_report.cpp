@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "common/wall_clock.h"
 #include "server/ros2/ros2_ingress.h"
 
 namespace cairn::server {
@@ -26,12 +27,6 @@ std::string ShownType(const std::string& wire) {
 
 std::string ShownName(const std::string& wire) {
   return wire.substr(2);
-}
-
-// As stamps say it.
-Stamp ClockOfServer() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 }  // namespace
@@ -68,8 +63,7 @@ std::vector<std::string> Ros2Ingress::ProblemsOf(const std::string& name, const 
     }
   }
   if (one.robot != nullptr) {
-    for (std::string& problem : one.robot->Problems(now, ClockOfServer(), writers_))
-      problems.push_back(std::move(problem));
+    for (std::string& problem : one.robot->Problems(now, WallClock(), writers_)) problems.push_back(std::move(problem));
   }
   if (problems.size() > kMaxProblems) problems.resize(kMaxProblems);
   for (std::string& problem : problems) problem.resize(std::min(problem.size(), kMaxText));

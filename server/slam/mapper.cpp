@@ -157,7 +157,7 @@ void Mapper::State::RetireKeyframes() {
   size_after_last_search = trail.size();
 }
 
-// A robot that does not know where it is would draw noise over its map, and the map would grow without end.
+// A robot that is not localized would draw noise over its map, and the map would grow without end.
 void Mapper::State::Draw(const TrackStep& step, bool placed_before) {
   const bool begins = filter->placed() && !placed_before;
   if (begins) {

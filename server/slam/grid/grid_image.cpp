@@ -24,10 +24,10 @@ OccupancyImage ImageOf(const OccupancyGrid& grid) {
   grid.ForEachChunk([&](const ChunkKey& key, const GridChunk& chunk) {
     const auto column = static_cast<std::size_t>((key.x - low.x) * kTileCells);
     const auto row = static_cast<std::size_t>((key.y - low.y) * kTileCells);
+    const TileCells cells = OccupanciesOf(chunk);
     for (std::size_t y = 0; y < kTileCells; ++y)
-      std::transform(chunk.log_odds.begin() + static_cast<std::ptrdiff_t>(y * kTileCells),
-                     chunk.log_odds.begin() + static_cast<std::ptrdiff_t>((y + 1) * kTileCells),
-                     image.cells.begin() + static_cast<std::ptrdiff_t>((row + y) * width + column), OccupancyOf);
+      std::copy_n(cells.begin() + static_cast<std::ptrdiff_t>(y * kTileCells), kTileCells,
+                  image.cells.begin() + static_cast<std::ptrdiff_t>((row + y) * width + column));
   });
   return image;
 }

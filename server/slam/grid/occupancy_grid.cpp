@@ -9,10 +9,6 @@ namespace {
 
 constexpr double kUnitsPerLogOdd = 100.0;
 
-std::size_t IndexInChunk(const GridCell& cell, const ChunkKey& key) {
-  return static_cast<std::size_t>((cell.y - key.y * kTileCells) * kTileCells + (cell.x - key.x * kTileCells));
-}
-
 }  // namespace
 
 std::int16_t LogOddsOf(double probability) {
@@ -23,6 +19,21 @@ std::uint8_t OccupancyOf(std::int16_t log_odds) {
   if (log_odds == kUnseen) return kUnknownCell;
   const double odds = std::exp(log_odds / kUnitsPerLogOdd);
   return static_cast<std::uint8_t>(std::lround(100.0 * odds / (1.0 + odds)));
+}
+
+TileCells OccupanciesOf(const GridChunk& chunk) {
+  TileCells cells;
+  // Most cells have the log odds of the cell before: an exponential for each would be most of the work.
+  std::int16_t before = kUnseen;
+  std::uint8_t occupancy = kUnknownCell;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (chunk.log_odds[i] != before) {
+      before = chunk.log_odds[i];
+      occupancy = OccupancyOf(before);
+    }
+    cells[i] = occupancy;
+  }
+  return cells;
 }
 
 void Visit(OptionVisitor& visitor, GridOptions& options) {
@@ -79,7 +90,7 @@ void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot, const Wants
   int row = std::numeric_limits<int>::min();
   static_assert(kTileCells % ScanRaster::kPiece == 0);  // A piece lies in one chunk.
   raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell first, const ScanRaster::Piece& marks) {
-    const ChunkKey key{FloorDiv(first.x, kTileCells), FloorDiv(first.y, kTileCells)};
+    const ChunkKey key = ChunkOf(first);
     if (key.y != row) chunks.clear();
     row = key.y;
     auto chunk = std::ranges::find(chunks, key.x, &std::pair<int, GridChunk*>::first);
@@ -135,12 +146,16 @@ OccupancyGrid::Change OccupancyGrid::TakeChange() {
   return change;
 }
 
-std::uint8_t OccupancyGrid::OccupancyAt(const Eigen::Vector2d& p_map) const {
-  const GridCell cell{static_cast<int>(std::floor(p_map.x() / options_.resolution_m)),
-                      static_cast<int>(std::floor(p_map.y() / options_.resolution_m))};
-  const ChunkKey key{FloorDiv(cell.x, kTileCells), FloorDiv(cell.y, kTileCells)};
+const GridChunk* OccupancyGrid::chunk(const ChunkKey& key) const {
   const auto found = slots_.find(key);
-  return found == slots_.end() ? kUnknownCell : OccupancyOf(found->second.chunk().log_odds[IndexInChunk(cell, key)]);
+  return found == slots_.end() ? nullptr : &found->second.chunk();
+}
+
+std::uint8_t OccupancyGrid::OccupancyAt(const Eigen::Vector2d& p_map) const {
+  const GridCell cell = CellOf(p_map, options_.resolution_m);
+  const ChunkKey key = ChunkOf(cell);
+  const GridChunk* const found = chunk(key);
+  return found == nullptr ? kUnknownCell : OccupancyOf(found->log_odds[IndexInChunk(cell, key)]);
 }
 
 GridChunk& OccupancyGrid::Writable(const ChunkKey& key) {

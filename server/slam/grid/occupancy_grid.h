@@ -47,10 +47,20 @@ struct ChunkKey {
   }
 };
 
+[[nodiscard]] inline ChunkKey ChunkOf(const GridCell& cell) {
+  return {FloorDiv(cell.x, kTileCells), FloorDiv(cell.y, kTileCells)};
+}
+// The index of a cell in the chunk `key`, which contains it.
+[[nodiscard]] inline std::size_t IndexInChunk(const GridCell& cell, const ChunkKey& key) {
+  return static_cast<std::size_t>((cell.y - key.y * kTileCells) * kTileCells + (cell.x - key.x * kTileCells));
+}
+
 // The log odds of a probability between 0 and 1.
 [[nodiscard]] std::int16_t LogOddsOf(double probability);
 // Converts log odds to an occupancy of 0..100 %, or kUnseen to kUnknownCell.
 [[nodiscard]] std::uint8_t OccupancyOf(std::int16_t log_odds);
+// The same of all cells of a chunk.
+[[nodiscard]] TileCells OccupanciesOf(const GridChunk& chunk);
 
 // How a scan changes a cell. Thesis A 3.7 describes two ways: it first spread each hit by a triangular
 // density in the plane (kTriangular), found that walls became thick, and then used deterministic cells that,
@@ -115,6 +125,8 @@ class OccupancyGrid {
     for (const auto& [key, slot] : slots_) visit(key, slot.chunk());
   }
   [[nodiscard]] std::size_t chunk_count() const { return slots_.size(); }
+  // Null: no ray has come near. Valid until the grid is changed or handed out.
+  [[nodiscard]] const GridChunk* chunk(const ChunkKey& key) const;
   // Occupancy at a point: 0..100 %, or kUnknownCell.
   [[nodiscard]] std::uint8_t OccupancyAt(const Eigen::Vector2d& p_map) const;
   [[nodiscard]] const GridOptions& options() const { return options_; }

@@ -13,14 +13,9 @@ namespace {
 
 static_assert(ScanRaster::kPiece == 2 * sizeof(std::uint64_t));
 
-// A pose may have any finite coordinates. Beyond kFarthest cells, all points fall into the last cell.
 int CellAlong(double coordinate_m, double resolution_m) {
   constexpr double kFarthest = 1e9;
   return static_cast<int>(std::clamp(std::floor(coordinate_m / resolution_m), -kFarthest, kFarthest));
-}
-
-GridCell CellOf(const Eigen::Vector2d& p_map, double resolution_m) {
-  return {CellAlong(p_map.x(), resolution_m), CellAlong(p_map.y(), resolution_m)};
 }
 
 int RoundDown(int value, int step) {
@@ -29,6 +24,10 @@ int RoundDown(int value, int step) {
 }
 
 }  // namespace
+
+GridCell CellOf(const Eigen::Vector2d& p_map, double resolution_m) {
+  return {CellAlong(p_map.x(), resolution_m), CellAlong(p_map.y(), resolution_m)};
+}
 
 void ScanRaster::MarkAll(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options) {
   const Pose2 T_map_laser = T_map_robot * scan.T_robot_laser;

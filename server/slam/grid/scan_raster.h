@@ -21,6 +21,8 @@ struct GridCell {
   int x = 0;
   int y = 0;
 };
+// The cell of a point, which may have any finite coordinates: beyond 1e9 cells, all points fall into the last cell.
+[[nodiscard]] GridCell CellOf(const Eigen::Vector2d& p_map, double resolution_m);
 
 struct RasterOptions {
   double resolution_m = 0.05;

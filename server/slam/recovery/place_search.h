@@ -2,10 +2,9 @@
 // scans are missing and odometry does not tell how the robot moved meanwhile, or after somebody carried it. The last
 // scans are compared with all surfaces of the map. A place is found only if no other place fits nearly as well, if most
 // of the scans is explained, and if no surface lies where beams passed. Where rooms look alike there is no such place.
-// It prefers finding nothing to finding a wrong place, but it can confuse a place that the map does not show with one
-// that it shows and that looks the same. Frames: surfaces in `map`; recent scans in any frame that is smooth over their
-// stretch. Not thread-safe. Deterministic. Source: as LoopSearch (loop_search.h), over the whole map at once;
-// visibility.h.
+// In doubt nothing is found. But a place that the map does not show can be taken for one that it shows and that looks
+// the same. Frames: surfaces in `map`; recent scans in any frame that is smooth over their stretch. Not thread-safe.
+// Deterministic. Source: as LoopSearch (loop_search.h), over the whole map at once; visibility.h.
 #pragma once
 
 #include <cstddef>

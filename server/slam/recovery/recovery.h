@@ -12,8 +12,7 @@
 //    match. It is looked for if within kMostDoubtedM of way they have not shown that nobody has carried it, and at once
 //    where a scan does not match. It goes on along its path if that was not likely and it is found nowhere else.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
-//  where
-//    the track leads, and elsewhere by two that agree, like all others.
+//    where the track leads, and elsewhere by two that agree, like all others.
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 

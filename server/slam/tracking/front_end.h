@@ -77,7 +77,7 @@ struct TrackStep {
   Eigen::Matrix2d surface_information = Eigen::Matrix2d::Zero();
   double moved_m = 0.0;      // Distance travelled since the previous scan.
   Pose2 T_prev_curr_odom{};  // The step from the previous scan as odometry measured it; none without odometry.
-  bool found = false;        // The step leads to where the robot was found again; odometry does not know it.
+  bool found = false;        // The step leads to where the robot was found again; odometry does not show it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
@@ -93,7 +93,7 @@ struct TrackStep {
 
 class FrontEnd {
  public:
-  // `walk` is the noise of steps that odometry alone knows.
+  // `walk` is the noise of steps that odometry alone shows.
   FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& walk);
 
   // From now on `watch` is told when kLook, kMatch and kRefine begin.

@@ -8,8 +8,8 @@
 // - The noise of odometry is learned with the parameters, and a difference that is large beside it (a wheel that slips,
 //   a robot that is pushed) counts little (Cauchy weights).
 // - A parameter is used once it is more than five standard deviations away from zero, and until it is less than three,
-// as long as the parameters explain odometry well; and never beyond the bounds in the options. Errors of
-//   turns below 1.5 % or 0.015 rad/m are only shown: scans mend them better.
+//   as long as the parameters explain odometry well; and never beyond the bounds in the options. Errors of turns below
+//   1.5 % or 0.015 rad/m are only shown: scans correct them better.
 // - The lag is learned only where there is dense odometry between the scans (PairedScan::rate). Where it is not known,
 //   nothing is used, because it looks like a turn scale.
 //

@@ -34,7 +34,7 @@ std::optional<TimedStep> LastStep(const Trail& trail, double longest_s) {
   return StepBetween(before.stamp, PlaceOf(trail, before), last.stamp, PlaceOf(trail, last), longest_s);
 }
 
-// The same from the front-end, which does not know the stamps: scans come at equal intervals.
+// The same from the front-end, which gets no stamps: scans come at equal intervals.
 std::optional<TimedStep> StepSince(const FrontEnd& front_end, const ScanBefore& last, Stamp now, double longest_s) {
   const auto step = front_end.LastStep();
   return step ? StepBetween(last.stamp, {}, now, *step, longest_s) : std::nullopt;

@@ -102,7 +102,10 @@ void AddMotion(CLI::App& app, Shared& shared) {
   command->footer(
       "A step ends when the odometry has moved by slam.gate.distance_m or turned by slam.gate.turn_rad. The learnt\n"
       "parameters hold for steps of about that size. The scan matcher's errors are measured against --truth; without\n"
-      "it, against the whole path of the estimator itself.\n"
+      "it, against the whole path of the estimator itself. Of the table: mean_d and sigma_d are per metre driven, "
+      "mean_b\n"
+      "and sigma_b per radian turned, as mean and standard deviation; failures are steps that the matcher could not\n"
+      "match, shortfalls such as it measured far too short.\n"
       "EXAMPLES\n  cairn-calibrate motion intel.clf --json\n  cairn-calibrate motion robot1.log --truth robot1.tum\n"
       "  cairn-calibrate motion intel.clf --set slam.matcher=ndt_de --set fit.particles=200\n"
       "  cairn-calibrate motion intel.clf -o learnt.yaml && cairn-offline intel.clf --config learnt.yaml "

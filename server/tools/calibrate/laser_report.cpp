@@ -84,10 +84,12 @@ void PrintTurn(const LaserReport& report, std::ostringstream& out) {
     return;
   }
   if (!turn.shown()) {
-    out << "not shown: with the best turn scans of one place disagree by " << 1e3 * turn.rms_m << " mm, with all beams "
-        << "at once by " << 1e3 * turn.rms_at_once_m << " mm\n              (better by " << turn.turning_sigmas
-        << " standard deviations, its side by " << turn.sense_sigmas << "; " << slam::TurnFit::kShown << " and "
-        << 100.0 * (1.0 - slam::TurnFit::kLargestRmsShare) << " % are needed; " << turn.pairs << " pairs)\n";
+    out << "this log does not show it: with the best turn scans of one place disagree by " << 1e3 * turn.rms_m
+        << " mm, with all beams at once by " << 1e3 * turn.rms_at_once_m << " mm (" << turn.pairs << " pairs).\n"
+        << "              That there is a turn is sure by " << turn.turning_sigmas
+        << " standard deviations, its sense by " << turn.sense_sigmas << "; both must be " << slam::TurnFit::kShown
+        << ", and the disagreement smaller by " << 100.0 * (1.0 - slam::TurnFit::kLargestRmsShare) << " %.\n"
+        << "              Leave --scan-period out, or take a log with more turns on the spot in both directions\n";
     return;
   }
   out << (turn.timing.clockwise.value_or(false) ? "clockwise" : "counter-clockwise") << " (by " << turn.sense_sigmas

@@ -25,6 +25,9 @@ std::string ReportText(const MotionReport& report) {
   out << "steps       " << report.steps << " measured, " << report.unmeasured_steps << " not; on average "
       << report.mean_step_m << " m and " << report.mean_step_rad << " rad (" << report.scans << " scans, "
       << report.unusable_scans << " unusable)\n";
+  const slam::MotionTermModel &along = report.eliazar.model.term(0), &turn = report.eliazar.model.term(2);
+  out << "in short    1 m of odometry is " << along.mean_d << " +- " << along.sigma_d << " m, 1 rad of it is "
+      << turn.mean_b << " +- " << turn.sigma_b << " rad\n";
   out << "odometry    Eliazar's model (4.46), " << report.eliazar.iterations << " iterations"
       << (report.eliazar.converged ? "" : ", NOT CONVERGED") << ", log likelihood " << report.eliazar.log_likelihood
       << " a step, " << std::setprecision(0) << 100 * report.eliazar.effective_share

@@ -98,11 +98,11 @@ TEST(TopTable, TheServersLoadIsThatSinceTheLastAnswer) {
   now.status.load = {
       .up_s = 3602.0, .processor_s = 1802.5, .memory_bytes = 200U << 20U, .inbound_waiting = 3, .outbound_waiting = 4};
   EXPECT_THAT(FormatTop(now, &before),
-              HasSubstr("server: up 1.0 h, 125 % of a processor, 200 MiB of memory, 7 values wait in it\n"));
+              HasSubstr("server: up 1.0 h, 125 % of a processor, 200 MiB of memory, 7 values queued\n"));
   EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("up 1.0 h, 50 % of"));
   now.status.load.strand_wait_p50_ms = 0.21;
   now.status.load.strand_wait_p99_ms = 12.0;
-  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("wait in it, work waits 0.2 ms for a thread (p99 12.0 ms)\n"));
+  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("values queued, a thread free after 0.2 ms (p99 12.0 ms)\n"));
   std::swap(before, now);  // The server was started again.
   EXPECT_THAT(FormatTop(now, &before), HasSubstr("up 1.0 h, 50 % of"));
   for (const auto& [up_s, text] : {std::pair(12.0, "up 12 s, "), {600.0, "up 10 min, "}, {259200.0, "up 3.0 days, "}}) {
@@ -116,7 +116,7 @@ TEST(TopTable, TheServersLoadIsThatSinceTheLastAnswer) {
                      .store_bytes = 5U << 20U,
                      .stored_after_p50_ms = 101.0,
                      .stored_after_p99_ms = 125.4};
-  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("; on the disk after 101 ms (p99 125 ms), 5 MiB there\n"));
+  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("; stored after 101 ms (p99 125 ms), 5 MiB on the disk\n"));
 }
 
 TEST(TopTable, SaysWhatIsNotAsUsual) {

@@ -32,10 +32,11 @@ TEST(ParseStart, RefusesWhatTheServerWould) {
   }
 }
 
-TEST(ValidateStart, RefusesWhatIsNotFinite) {
+TEST(ValidateStart, RefusesWhatIsNotFiniteOrTooLarge) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(ValidateStart({1e6, -1e6, 3.0}));
-  for (const Pose2& pose : {Pose2{kNan, 0, 0}, Pose2{0, kInf, 0}, Pose2{0, 0, kNan}, Pose2{0, -1.1e6, 0}})
+  for (const Pose2& pose :
+       {Pose2{kNan, 0, 0}, Pose2{0, kInf, 0}, Pose2{0, 0, kNan}, Pose2{0, -1.1e6, 0}, Pose2{0, 0, 1e7}})
     EXPECT_FALSE(ValidateStart(pose));
 }
 

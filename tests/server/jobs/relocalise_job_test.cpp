@@ -31,9 +31,7 @@ std::shared_ptr<const slam::KnownGrid> MapOf(const World& world, double from_m, 
   for (std::size_t k = 0; k < drive.truth.size(); ++k) grid.Draw(*drive.snapshot.keyframes[k].scan, drive.truth[k]);
   slam::KnownGrid::Tiles tiles;
   grid.ForEachChunk([&](const slam::ChunkKey& key, const slam::GridChunk& chunk) {
-    auto cells = std::make_shared<TileCells>();
-    for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(chunk.log_odds[i]);
-    tiles.emplace(key, std::move(cells));
+    tiles.emplace(key, std::make_shared<const TileCells>(slam::OccupanciesOf(chunk)));
   });
   return std::make_shared<const slam::KnownGrid>(
       slam::KnownGrid::Source{std::move(tiles), grid.options().resolution_m, 0}, kOptions.place,

@@ -71,9 +71,7 @@ std::shared_ptr<const slam::KnownGrid> MapOf(const slam::MapperSnapshot& snapsho
   for (std::size_t k = 0; k < path.size(); ++k) grid.Draw(*snapshot.keyframes[k].scan, path[k]);
   slam::KnownGrid::Tiles tiles;
   grid.ForEachChunk([&](const slam::ChunkKey& key, const slam::GridChunk& chunk) {
-    auto cells = std::make_shared<TileCells>();
-    for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(chunk.log_odds[i]);
-    tiles.emplace(key, std::move(cells));
+    tiles.emplace(key, std::make_shared<const TileCells>(slam::OccupanciesOf(chunk)));
   });
   return std::make_shared<const slam::KnownGrid>(
       slam::KnownGrid::Source{std::move(tiles), options.grid.resolution_m, 0}, options.recovery.place,

@@ -69,9 +69,7 @@ class SiteMap {
   [[nodiscard]] std::shared_ptr<const slam::KnownGrid> Known() const {
     slam::KnownGrid::Tiles tiles;
     grid_.ForEachChunk([&](const slam::ChunkKey& key, const slam::GridChunk& chunk) {
-      auto cells = std::make_shared<TileCells>();
-      for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(chunk.log_odds[i]);
-      tiles.emplace(key, std::move(cells));
+      tiles.emplace(key, std::make_shared<const TileCells>(slam::OccupanciesOf(chunk)));
     });
     return std::make_shared<const slam::KnownGrid>(
         slam::KnownGrid::Source{std::move(tiles), options_.grid.resolution_m, 0}, options_.recovery.place,

@@ -25,9 +25,7 @@ std::shared_ptr<const KnownGrid> KnownGridOf(const OccupancyGrid& grid) {
   const MapperOptions options;
   KnownGrid::Tiles tiles;
   grid.ForEachChunk([&](const ChunkKey& key, const GridChunk& chunk) {
-    auto cells = std::make_shared<TileCells>();
-    for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = OccupancyOf(chunk.log_odds[i]);
-    tiles.emplace(key, std::move(cells));
+    tiles.emplace(key, std::make_shared<const TileCells>(OccupanciesOf(chunk)));
   });
   return std::make_shared<const KnownGrid>(KnownGrid::Source{std::move(tiles), grid.options().resolution_m, 0},
                                            options.recovery.place, options.self_check.near_m);
