@@ -10,7 +10,7 @@ namespace cairn::slam {
 namespace {
 
 constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
-constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
+constexpr std::size_t kMaxHeld = 120;  // Keyframes that may be added to the path at once: bounds the time of one scan.
 // Scans for which a place that a job has found is looked at: a minute of most lidars.
 constexpr int kMaxScansSuggested = 600;
 // Standard deviations of the place of another map relative to that of the robot, where both show it.
@@ -216,7 +216,7 @@ Recovery::Belief Recovery::BeliefAt(const Pose2& T_odom_robot, const Pose2& T_tr
   const PoseReason reason = lost ? PoseReason::kLost : PoseReason::kOdometryOnly;
   const Pose2 T_map_carried = known_.T_map_robot * moved;
   if (!T_map_track_) return {T_map_carried, covariance, reason};
-  // The track may go on at a place that only looks like the last one, and odometry does not know of being carried.
+  // The track may go on at a place that only looks like the last one, and odometry does not show that it was carried.
   const Pose2 T_map_tracked = *T_map_track_ * T_track_robot;
   Eigen::Vector3d apart;
   apart << T_map_tracked.translation() - T_map_carried.translation(),
