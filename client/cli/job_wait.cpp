@@ -1,5 +1,7 @@
 #include "client/cli/job_wait.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
 
 #include "client/cli/interrupt.h"
@@ -18,7 +20,8 @@ Result<Job> WaitForEnd(Program& program, const Job& submitted) {
       return !Interrupted();
     });
   });
-  if (job) progress.Finish(seconds(), job->progress, FormatJob(*job));
+  // What became of it is printed by whoever waits.
+  if (job) progress.Finish(seconds(), job->progress, fmt::format("job {}: {}", job->id, JobStateName(job->state)));
   return job;
 }
 

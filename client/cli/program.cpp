@@ -117,6 +117,10 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
       "Exit codes: 0 done, 1 failed (one line on standard error says why), 2 wrong command line.");
   app.fallthrough();
   app.require_subcommand(1);
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return "cairn: " + std::string(error.what()) +
+           "\n`cairn --help` lists the commands, `cairn COMMAND --help` what one of them takes\n";
+  });
   AddGlobalOptions(app, program, wire);
   AddCommands(app, program);
   AddManualPages(app);
