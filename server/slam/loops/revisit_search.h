@@ -25,7 +25,7 @@ struct RevisitOptions {
   double max_distance_m = 3.0;
   double max_turn_rad = 1.2;  // A laser with a half circle sees nothing in common beyond this.
   std::int64_t neighbours = 8;
-  double sigma_m = 0.1;
+  double sigma_m = 0.03;
 };
 void Visit(OptionVisitor& visitor, RevisitOptions& options);
 

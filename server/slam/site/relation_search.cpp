@@ -26,11 +26,13 @@ constexpr double kShortestStretchM = 7.5;  // Less way shows too little to be un
 constexpr double kMaxRevisitWayM = 25.0;  // Farther from the nearest tie the guess is too bad for one scan.
 constexpr double kGuessSigmaM = 0.5;      // Standard deviations of a guess in the alignment, as for one robot.
 constexpr double kGuessSigmaRad = 0.15;
-constexpr double kMinRevisitScore = 0.6;   // Share of the points of the scan that must be explained.
-constexpr double kRevisitSigmaRad = 0.02;  // Added to the heading of a match.
-constexpr double kCorrectionM = 0.3;       // A revisit may correct the guess by so much, ...
-constexpr double kCorrectionPerM = 0.03;   // ... and more with the way from the nearest tie.
-constexpr int kMinRevisitPoints = 20;      // Points.
+constexpr double kMinRevisitScore = 0.6;  // Share of the points of the scan that must be explained.
+// Added to a match of two sessions, whose maps are bent in different ways. Much more than for one robot.
+constexpr double kRevisitSigmaM = 0.1;
+constexpr double kRevisitSigmaRad = 0.02;
+constexpr double kCorrectionM = 0.3;      // A revisit may correct the guess by so much, ...
+constexpr double kCorrectionPerM = 0.03;  // ... and more with the way from the nearest tie.
+constexpr int kMinRevisitPoints = 20;     // Points.
 
 // Stretches.
 constexpr double kRevisitNearM = 3.0;  // No stretch is compared within this way of a revisit.
@@ -177,7 +179,7 @@ class NearbySearch {
     return SessionRelation{{known_.number, centre},
                            {seen_.number, seen},
                            match.T_ref_curr,
-                           match.covariance + PoseCovariance(options_.revisit.sigma_m, kRevisitSigmaRad)};
+                           match.covariance + PoseCovariance(kRevisitSigmaM, kRevisitSigmaRad)};
   }
 
   [[nodiscard]] std::optional<SessionRelation> MeasureStretch(std::size_t centre, std::size_t seen,
