@@ -1,6 +1,7 @@
 #include "server/ros2/site_grid.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace cairn::server {
 namespace {
@@ -31,20 +32,31 @@ void SiteGrid::Bounds::Add(int x, int y) {
 SiteGrid::SiteGrid(std::string frame, double map_period_s, std::int64_t max_cells)
     : frame_(std::move(frame)), period_(map_period_s), max_cells_(static_cast<std::uint64_t>(max_cells)) {}
 
+bool SiteGrid::Enter(std::uint32_t epoch) {
+  if (epoch < epoch_) return false;
+  if (epoch == epoch_) return true;
+  // The map changed as a whole: what does not come again is no part of it.
+  epoch_ = epoch;
+  for (const auto& [place, cells] : tiles_) changed_.Add(place.second, place.first);
+  if (std::exchange(epoch_was_complete_, false) || waited_) tiles_before_ = std::move(tiles_);
+  tiles_.clear();
+  incomplete_since_.reset();
+  waited_ = false;
+  return true;
+}
+
 void SiteGrid::Take(const MapInfo& info) {
   site_ = info.site;
   resolution_ = info.resolution_m;
+  if (!Enter(info.epoch)) return;
+  info_epoch_ = info.epoch;
+  tile_count_ = info.tile_count;
+  NoteComplete();
 }
 
 void SiteGrid::Take(const TileSample& sample) {
   const TileKey& key = sample.tile.key;
-  if (key.level != 0 || sample.tile.epoch < epoch_) return;
-  if (sample.tile.epoch > epoch_) {
-    // The map changed as a whole: what does not come again is no part of it.
-    epoch_ = sample.tile.epoch;
-    for (const auto& [place, cells] : tiles_) changed_.Add(place.second, place.first);
-    tiles_.clear();
-  }
+  if (key.level != 0 || !Enter(sample.tile.epoch)) return;
   if (sample.deleted) {
     if (tiles_.erase({key.y, key.x}) > 0) changed_.Add(key.x, key.y);
     return;
@@ -53,14 +65,31 @@ void SiteGrid::Take(const TileSample& sample) {
   if (!cells) return;
   tiles_.insert_or_assign({key.y, key.x}, *cells);
   changed_.Add(key.x, key.y);
+  NoteComplete();
 }
 
-std::vector<std::int8_t> SiteGrid::CellsOf(const Bounds& bounds) const {
+void SiteGrid::NoteComplete() {
+  if (!complete()) return;
+  incomplete_since_.reset();
+  waited_ = false;
+  // A map without tiles may be one of which the tiles are still being read.
+  epoch_was_complete_ = epoch_was_complete_ || tile_count_ > 0;
+  tiles_before_.clear();
+}
+
+bool SiteGrid::IsHeld(Clock::time_point now) {
+  if (complete()) return false;
+  if (!incomplete_since_) incomplete_since_ = now;
+  waited_ = waited_ || now - *incomplete_since_ >= kCompleteWithin;
+  return !waited_;
+}
+
+std::vector<std::int8_t> SiteGrid::CellsOf(const Tiles& tiles, const Bounds& bounds) {
   const auto width = static_cast<std::size_t>(bounds.x_max - bounds.x_min + 1) * kTileCells;
   std::vector<std::int8_t> cells(bounds.cells(), -1);
   for (int y = bounds.y_min; y <= bounds.y_max; ++y) {
-    const auto end = tiles_.upper_bound({y, bounds.x_max});
-    for (auto tile = tiles_.lower_bound({y, bounds.x_min}); tile != end; ++tile) {
+    const auto end = tiles.upper_bound({y, bounds.x_max});
+    for (auto tile = tiles.lower_bound({y, bounds.x_min}); tile != end; ++tile) {
       const auto left = static_cast<std::size_t>(tile->first.second - bounds.x_min) * kTileCells;
       const auto bottom = static_cast<std::size_t>(y - bounds.y_min) * kTileCells;
       for (std::size_t row = 0; row < kTileCells; ++row) {
@@ -73,15 +102,16 @@ std::vector<std::int8_t> SiteGrid::CellsOf(const Bounds& bounds) const {
   return cells;
 }
 
-SiteGrid::Bounds SiteGrid::BoundsOfTiles() const {
+SiteGrid::Bounds SiteGrid::BoundsOf(const Tiles& tiles) {
   Bounds bounds;
-  for (const auto& [place, cells] : tiles_) bounds.Add(place.second, place.first);
+  for (const auto& [place, cells] : tiles) bounds.Add(place.second, place.first);
   return bounds;
 }
 
 ros2::Grid SiteGrid::Now(Stamp stamp) const {
-  const Bounds bounds = BoundsOfTiles();
-  if (!bounds.empty() && bounds.cells() <= max_cells_) return Whole(bounds, stamp);
+  const Tiles& tiles = complete() || waited_ || epoch_was_complete_ ? tiles_ : tiles_before_;
+  const Bounds bounds = BoundsOf(tiles);
+  if (!bounds.empty() && bounds.cells() <= max_cells_) return Whole(tiles, bounds, stamp);
   ros2::Grid nothing;
   nothing.header = {stamp, frame_};
   nothing.loaded = stamp;
@@ -89,7 +119,7 @@ ros2::Grid SiteGrid::Now(Stamp stamp) const {
   return nothing;
 }
 
-ros2::Grid SiteGrid::Whole(const Bounds& bounds, Stamp stamp) const {
+ros2::Grid SiteGrid::Whole(const Tiles& tiles, const Bounds& bounds, Stamp stamp) const {
   ros2::Grid grid;
   grid.header = {stamp, frame_};
   grid.loaded = stamp;
@@ -97,13 +127,16 @@ ros2::Grid SiteGrid::Whole(const Bounds& bounds, Stamp stamp) const {
   grid.width = static_cast<std::uint32_t>((bounds.x_max - bounds.x_min + 1) * kTileCells);
   grid.height = static_cast<std::uint32_t>((bounds.y_max - bounds.y_min + 1) * kTileCells);
   grid.T_frame_origin = {bounds.x_min * kTileCells * resolution_, bounds.y_min * kTileCells * resolution_, 0.0};
-  grid.cells = CellsOf(bounds);
+  grid.cells = CellsOf(tiles, bounds);
   return grid;
 }
 
 SiteGrid::Due SiteGrid::Next(bool wanted, Stamp stamp, Clock::time_point now) {
+  wanted_ = wanted_ || wanted;
+  if (IsHeld(now)) return {};
+  wanted = std::exchange(wanted_, false);
   if (site_.empty() || (changed_.empty() && !whole_is_old_)) return {};
-  Bounds bounds = BoundsOfTiles();
+  Bounds bounds = BoundsOf(tiles_);
   if (bounds.empty()) bounds = published_;  // The site was emptied: nothing of it is known any more.
   too_large_ = bounds.cells() > max_cells_;
   if (bounds.empty() || too_large_) return {};
@@ -115,7 +148,7 @@ SiteGrid::Due SiteGrid::Next(bool wanted, Stamp stamp, Clock::time_point now) {
     changed_ = {};
     whole_is_old_ = false;
     whole_at_ = now;
-    return Whole(published_, stamp);
+    return Whole(tiles_, published_, stamp);
   }
   if (resized || changed_.empty()) return {};
   // A tile outside may have come and gone in between.
@@ -131,7 +164,7 @@ SiteGrid::Due SiteGrid::Next(bool wanted, Stamp stamp, Clock::time_point now) {
   update.y = (changed_.y_min - published_.y_min) * kTileCells;
   update.width = static_cast<std::uint32_t>((changed_.x_max - changed_.x_min + 1) * kTileCells);
   update.height = static_cast<std::uint32_t>((changed_.y_max - changed_.y_min + 1) * kTileCells);
-  update.cells = CellsOf(changed_);
+  update.cells = CellsOf(tiles_, changed_);
   changed_ = {};
   whole_is_old_ = true;
   return update;

@@ -23,6 +23,8 @@ class SiteGrid {
   using Clock = std::chrono::steady_clock;
   // While a site grows, its whole map is published at most this often.
   static constexpr std::chrono::seconds kShortestPeriod{1};
+  // So long the tiles that the site says it has are waited for.
+  static constexpr std::chrono::seconds kCompleteWithin{2};
 
   SiteGrid(std::string frame, double map_period_s, std::int64_t max_cells);
 
@@ -31,11 +33,13 @@ class SiteGrid {
   void Take(const TileSample& sample);
 
   // What is due: the whole map if `wanted` (somebody new listens), if its size has changed or the last one is too old;
-  // else the rectangle that has changed since; nothing where neither has anything new. `stamp`: of the message.
+  // else the rectangle that has changed since; nothing where neither has anything new, or while tiles are missing, for
+  // at most kCompleteWithin: what a planner does not know it may drive through. `stamp`: of the message.
   using Due = std::variant<std::monostate, ros2::Grid, ros2::GridUpdate>;
   [[nodiscard]] Due Next(bool wanted, Stamp stamp, Clock::time_point now);
 
-  // The whole map as it is now, whatever was published; without cells if there is none, or if it is too large.
+  // The whole map as it is now, whatever was published; without cells if there is none, or if it is too large. Where
+  // the map has just changed as a whole and tiles are missing, the map before that.
   [[nodiscard]] ros2::Grid Now(Stamp stamp) const;
 
   [[nodiscard]] const std::string& site() const { return site_; }
@@ -52,10 +56,19 @@ class SiteGrid {
     void Add(int x, int y);
   };
 
+  using Tiles = std::map<Place, TileCells>;
+
+  // False: it is of an epoch that has passed.
+  [[nodiscard]] bool Enter(std::uint32_t epoch);
+  // As many tiles are here as the site says.
+  [[nodiscard]] bool complete() const { return info_epoch_ == epoch_ && tiles_.size() >= tile_count_; }
+  void NoteComplete();
+  // Tiles are missing, and have not been waited for long enough.
+  [[nodiscard]] bool IsHeld(Clock::time_point now);
   // The cells of all tiles within the bounds.
-  [[nodiscard]] std::vector<std::int8_t> CellsOf(const Bounds& bounds) const;
-  [[nodiscard]] Bounds BoundsOfTiles() const;
-  [[nodiscard]] ros2::Grid Whole(const Bounds& bounds, Stamp stamp) const;
+  [[nodiscard]] static std::vector<std::int8_t> CellsOf(const Tiles& tiles, const Bounds& bounds);
+  [[nodiscard]] static Bounds BoundsOf(const Tiles& tiles);
+  [[nodiscard]] ros2::Grid Whole(const Tiles& tiles, const Bounds& bounds, Stamp stamp) const;
 
   const std::string frame_;
   const std::chrono::duration<double> period_;
@@ -63,7 +76,14 @@ class SiteGrid {
   std::string site_;
   double resolution_ = 0.0;
   std::uint32_t epoch_ = 0;
-  std::map<Place, TileCells> tiles_;
+  std::uint32_t info_epoch_ = 0;  // Of the last MapInfo, and ...
+  std::uint32_t tile_count_ = 0;  // ... how many tiles the map has by it.
+  bool epoch_was_complete_ = false;
+  std::optional<Clock::time_point> incomplete_since_;
+  bool waited_ = false;  // For long enough, since then.
+  bool wanted_ = false;  // Somebody new listens, since when the map has been held back.
+  Tiles tiles_;
+  Tiles tiles_before_;  // Of the epoch before, until this one is complete.
   Bounds published_;
   Bounds changed_;             // Since the last message.
   bool whole_is_old_ = false;  // Changes were published since the whole map was.

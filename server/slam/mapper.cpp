@@ -34,8 +34,7 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
     if (passage != Passage::kDriven || s.localisation->looking()) rolling = nullptr;
     TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
                                     std::move(scan), rolling, T_odom_robot, parallel_for);
-    s.learning.LearnUnless(passage != Passage::kDriven || s.localisation->looking(), tracked.step);
-    return s.Localise(std::move(tracked), T_odom_robot, passage, parallel_for);
+    return s.Localise(std::move(tracked), T_odom_robot, passage, rolling != nullptr, parallel_for);
   }
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);

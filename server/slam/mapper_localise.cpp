@@ -1,11 +1,11 @@
 // The part of the mapper that follows a robot in the map of others, and maps nothing.
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "server/slam/mapper_state.h"
 
 namespace cairn::slam {
-
 GridLocalisationOptions Mapper::State::LocalisationOptions() const {
   return {.recovery = options.recovery,
           .loop = options.loop,
@@ -64,7 +64,21 @@ Passage Mapper::State::LocaliseAfter(Passage passage, bool tilted) {
   return passage;
 }
 
-ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
+// If somebody may have carried the robot since the last scan: how that agreed with the known map.
+std::optional<SceneAgreement> Mapper::State::BeforeCarriedInMap(const Scan& scan,
+                                                                const std::vector<SurfacePoint>& points_robot,
+                                                                const TrackStep& step) const {
+  if (!options.self_check.enabled || localisation->looking() || !last_scan) return std::nullopt;
+  if (!MayBeCarried(level.outcome.score, step.score)) return std::nullopt;
+  const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
+  const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, level.outcome.score};
+  const FollowedMap followed{*localisation->map(), localisation->T_map_track()};
+  const SceneAgreement before = AgreementWithMap(followed, last);
+  if (!LooksCarried(followed, last, before, {scan, points_robot, step.T_track_robot, step.score})) return std::nullopt;
+  return before;
+}
+
+ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage, bool rolling,
                                     const ParallelFor& parallel_for) {
   auto& [still, view, step] = tracked;
   const auto goes_on = [&, &still = still, &view = view, &step = step] {
@@ -73,7 +87,14 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
            AgreesAsBefore(*still, view.points_robot, step,
                           {localisation->recovery(), *localisation->map(), localisation->T_map_track()});
   };
-  const bool watched = passage == Passage::kDriven || StoodStill(*still, T_odom_robot, step) || goes_on();
+  const bool driven = passage == Passage::kDriven;
+  const bool watched = driven || StoodStill(*still, T_odom_robot, step) || goes_on();
+  // A scan that was measured in a fast turn may be deformed, and no longer fit what the robot has just seen.
+  const bool deformed =
+      rolling && last_scan && std::abs(AngleDiff(T_odom_robot.theta, last_scan->T_odom_robot.theta)) > kFastTurnRad;
+  const auto before_carried = driven && !deformed ? BeforeCarriedInMap(*still, view.points_robot, step) : std::nullopt;
+  if (before_carried && !StoodStill(*still, T_odom_robot, step)) localisation->Doubt(*before_carried, step.score);
+  learning.LearnUnless(!driven || localisation->looking(), step);
   // The last scans do not belong together with this one.
   if (!watched || (!step.matched && localisation->looking())) {
     localisation->Lose(options.front_end.use_odometry && passage != Passage::kUnknown);
@@ -81,9 +102,10 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
     step = front_end.Track(view, T_odom_robot, parallel_for);
   }
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
+  level.outcome.score = step.score;
   const Keyframe seen{still, OdometryOrNone(T_odom_robot)};
   const GridLocalisation::Followed followed = localisation->Take({seen, view.points_robot, step});
-  if (followed.moved_enough) front_end.AddKeyframe(view);
+  if (followed.is_reference) front_end.AddKeyframe(view);
   return ReportLocalised(still->stamp, T_odom_robot, followed.place, step.score);
 }
 

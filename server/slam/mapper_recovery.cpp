@@ -10,8 +10,6 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kFastTurnRad = 0.1;  // From one scan to the next.
-
 // Whether at least the share `least` of the beams shows the same range.
 bool LookAlike(const Scan& a, const Scan& b, double least, const RecoveryOptions& options) {
   if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;

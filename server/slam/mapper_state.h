@@ -27,6 +27,9 @@
 
 namespace cairn::slam {
 
+// From one scan to the next: a scan that was measured meanwhile may be deformed.
+inline constexpr double kFastTurnRad = 0.1;
+
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
@@ -65,6 +68,9 @@ struct Mapper::State {
   [[nodiscard]] std::optional<SceneAgreement> BeforeCarried(const Scan& scan,
                                                             const std::vector<SurfacePoint>& points_robot,
                                                             const TrackStep& step) const;
+  [[nodiscard]] std::optional<SceneAgreement> BeforeCarriedInMap(const Scan& scan,
+                                                                 const std::vector<SurfacePoint>& points_robot,
+                                                                 const TrackStep& step) const;
   void EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step,
                 const ParallelFor& parallel_for);
   void AddHeld(std::span<const Recovery::Held> held, const ParallelFor& parallel_for);
@@ -92,7 +98,7 @@ struct Mapper::State {
   [[nodiscard]] ScanOutcome ReportLocalised(Stamp stamp, const Pose2& T_odom_robot,
                                             const GridLocalisation::Place& place, double score) const;
   Result<void> MapAgain();
-  ScanOutcome Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
+  ScanOutcome Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage, bool rolling,
                        const ParallelFor& parallel_for);
   [[nodiscard]] GridLocalisationOptions LocalisationOptions() const;
   ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
@@ -166,7 +172,8 @@ struct Mapper::State {
     archive(*self.localisation);
   }
 
-  // The last scan that was reported as part of the path and was not tilted.
+  // The last scan that was reported as part of the path and was not tilted. `outcome.score` is also that of the last
+  // scan of a robot that is only localised.
   struct LevelScan {
     ScanOutcome outcome;
     Pose2 T_keyframe_robot;

@@ -1,7 +1,9 @@
 #include "server/slam/known_grid/grid_localisation.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "server/slam/tracking/blind_motion.h"
@@ -67,6 +69,12 @@ void GridLocalisation::Lose(bool odometry_goes_on) {
   recovery_.Begin({last_.T_map_robot, T_odom_robot_, last_.covariance}, odometry_goes_on);
 }
 
+void GridLocalisation::Doubt(const SceneAgreement& before, double score) {
+  last_.reason = PoseReason::kLost;
+  recovery_.BeginOnPath({last_.T_map_robot, T_odom_robot_, last_.covariance}, T_map_track());
+  recovery_.BeginDoubt(before, score);
+}
+
 void GridLocalisation::BeginWhereSaid(const Pose2& T_map_robot) {
   const PlaceSearchOptions& place = options_.recovery.place;
   last_ = {T_map_robot, PoseCovariance(place.near_m, place.near_rad), PoseReason::kLost};
@@ -97,10 +105,30 @@ GridLocalisation::Followed GridLocalisation::Take(const Sight& sight) {
   return followed;
 }
 
-// The robot is looked for.
+bool GridLocalisation::IsCleared(const Sight& sight) const {
+  if (!sight.step.matched || recovery_.was_carried()) return false;
+  const SeenScan now{*sight.scan.scan, sight.points_robot, sight.step.T_track_robot, sight.step.score};
+  // The first scan since then was matched with what it may not belong to.
+  const std::vector<RecentScan>& recent = recovery_.recent();
+  const auto since = std::span(recent).subspan(std::min<std::size_t>(1, recent.size()));
+  return !StaysDifferent(recovery_.doubt()->before, AgreementWithMap({*map_, T_map_track()}, now),
+                         ConflictWith(since, now));
+}
+
+// The robot is looked for, or doubted.
 GridLocalisation::Followed GridLocalisation::Look(const Sight& sight) {
-  const bool first = !recovery_.has_scans();
-  const bool keep = first || MovedEnough(Between(T_track_kept_, sight.step.T_track_robot), options_.gate);
+  if (recovery_.doubt()) {
+    if (IsCleared(sight)) {
+      recovery_.End();
+      last_.reason = PoseReason::kOdometryOnly;  // Until the next alignment.
+      return Follow(sight);
+    }
+    AddStep(sight.step);
+  }
+  // The second scan of a doubted robot is the first that is matched with what it belongs to.
+  const std::size_t recent = recovery_.recent().size();
+  const bool keep = recent == 0 || (recovery_.doubt() && recent == 1) ||
+                    MovedEnough(Between(T_track_kept_, sight.step.T_track_robot), options_.gate);
   if (keep) {
     T_track_kept_ = sight.step.T_track_robot;
     if (const auto found = recovery_.Take(sight.scan, sight.step, sight.points_robot, *map_)) {
@@ -128,8 +156,8 @@ GridLocalisation::Fix GridLocalisation::Predicted(const TrackStep& step) const {
           step.T_track_robot};
 }
 
-GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
-  const TrackStep& step = sight.step;
+// What the step adds to the way, and to what no scan has measured of it.
+void GridLocalisation::AddStep(const TrackStep& step) {
   const double step_m = (step.T_track_robot.translation() - T_track_robot_.translation()).norm();
   way_m_ += step_m;
   if (options_.uses_odometry) {
@@ -138,12 +166,17 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
     blind_covariance_ += options_.blind.Covariance({step_m, 0.0, 0.0});
   }
   unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step_m;
+}
+
+GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
+  const TrackStep& step = sight.step;
+  AddStep(step);
   Fix now = Predicted(step);
   PoseReason reason = step.matched ? last_.reason : PoseReason::kOdometryOnly;
   const bool moved_enough = MovedEnough(Between(fix_.T_track_robot, step.T_track_robot), options_.gate);
-  bool contradicted = false;
+  bool contradicted = false, fixed = false;
   if (moved_enough) {
-    const bool fixed = Align(sight, now);
+    fixed = Align(sight, now);
     if (fixed) unmatched_m_ = 0.0;
     reason = fixed ? PoseReason::kTracking : PoseReason::kOdometryOnly;
     fix_ = now;
@@ -158,7 +191,7 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
   } else if (unmatched_m_ > options_.lost_after_m || IsTooDoubtful(now.covariance)) {
     LookNear();
   }
-  return {last_, moved_enough};
+  return {last_, moved_enough && (step.matched || fixed)};
 }
 
 bool GridLocalisation::Align(const Sight& sight, Fix& fix) const {

@@ -1,11 +1,12 @@
 // Follows a robot in a map that it does not change. Between the fixes the front-end carries the pose; about every
 // quarter of a metre the scan is aligned with the surfaces of the map, and the answer is fused with the pose. Where the
 // map shows nothing, the pose goes on with growing doubt. The robot is lost where that doubt is too large, or where the
-// scans contradict the map over some metres. It is then looked for as one that was not watched (recovery.h), in this
-// map. People, and furniture that has moved, contradict in some places; that is borne, because it does not contradict
-// for metres everywhere. Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic. Source: the
-// extended Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points
-// and surfaces.
+// scans contradict the map over some metres, and it is doubted where somebody may have carried it between two scans
+// (recovery/carried.h). It is then looked for as one that was not watched (recovery.h), in this map. People, and
+// furniture that has moved, contradict in some places; that is borne, because it does not contradict for metres
+// everywhere. Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic. Source: the extended
+// Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points and
+// surfaces.
 #pragma once
 
 #include <deque>
@@ -46,6 +47,9 @@ class GridLocalisation {
   void Replace(std::shared_ptr<const KnownGrid> map);
   // The robot may be anywhere. `odometry_goes_on`: since the last scan.
   void Lose(bool odometry_goes_on);
+  // The robot may have been carried since the last scan (carried.h), which agreed with the map as `before` says. The
+  // scan after it has this score. The robot is not localized until that is clear, and looked for if it stays so.
+  void Doubt(const SceneAgreement& before, double score);
   // Somebody says that it is at this pose.
   void BeginWhereSaid(const Pose2& T_map_robot);
 
@@ -68,7 +72,9 @@ class GridLocalisation {
   };
   struct Followed {
     Place place;
-    bool moved_enough = false;  // The front-end should take the scan as its reference.
+    // The front-end should take the scan as its reference. One that shows nothing of where the robot is, or of how it
+    // has moved, is none: the scans after it would match with it and hide that the robot may have been carried.
+    bool is_reference = false;
   };
   Followed Take(const Sight& sight);
 
@@ -111,6 +117,9 @@ class GridLocalisation {
   void LookNear();
   Followed Look(const Sight& sight);
   Followed Follow(const Sight& sight);
+  // Whether the scans of a doubted robot show that nobody has carried it.
+  [[nodiscard]] bool IsCleared(const Sight& sight) const;
+  void AddStep(const TrackStep& step);
   [[nodiscard]] Fix Predicted(const TrackStep& step) const;
   // Whether the scan was found in the map there.
   bool Align(const Sight& sight, Fix& fix) const;

@@ -34,6 +34,11 @@ double ConflictOf(const VisibilityCounts& counts) {
   return !IsKnown(counts) ? 0.0 : static_cast<double>(counts.contradicted) / counts.known();
 }
 
+double ConflictOfStep(const SeenScan& last, const SeenScan& now) {
+  return ConflictOf(CompareBothWays(last.scan, last.points_robot, now.scan, now.points_robot,
+                                    Between(last.T_track_robot, now.T_track_robot), kNearM));
+}
+
 }  // namespace
 
 SceneAgreement AgreementWithLast(const Trail& trail, const SeenScan& seen) {
@@ -59,10 +64,22 @@ bool MayBeCarried(double before, double score) {
 
 bool LooksCarried(const Trail& trail, const SeenScan& last, const SceneAgreement& before, const SeenScan& now) {
   if (!MayBeCarried(before.score, now.score)) return false;
-  const VisibilityCounts step = CompareBothWays(last.scan, last.points_robot, now.scan, now.points_robot,
-                                                Between(last.T_track_robot, now.T_track_robot), kNearM);
-  return ConflictOf(step) > kLeastRise &&
+  return ConflictOfStep(last, now) > kLeastRise &&
          AgreementWithLast(trail, now).conflict > kTimes * before.conflict + kLeastRise;
+}
+
+SceneAgreement AgreementWithMap(const FollowedMap& followed, const SeenScan& seen) {
+  const VisibilityCounts counts =
+      followed.map.Compare(seen.scan, seen.points_robot, followed.T_map_track * seen.T_track_robot);
+  return {seen.score, ConflictOf(counts), IsKnown(counts)};
+}
+
+bool LooksCarried(const FollowedMap& followed, const SeenScan& last, const SceneAgreement& before,
+                  const SeenScan& now) {
+  if (!MayBeCarried(before.score, now.score) || ConflictOfStep(last, now) <= kLeastRise) return false;
+  const SceneAgreement after = AgreementWithMap(followed, now);
+  // Where the map shows nothing, the robot may have been carried out of it.
+  return after.known ? after.conflict > kTimes * before.conflict + kLeastRise : before.known;
 }
 
 double ConflictWith(std::span<const RecentScan> since, const SeenScan& now) {

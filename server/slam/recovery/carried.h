@@ -12,6 +12,7 @@
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
 #include "server/slam/recovery/place_search.h"
+#include "server/slam/recovery/searched_map.h"
 #include "server/slam/scan/surface_points.h"
 #include "server/slam/trail/trail.h"
 
@@ -49,6 +50,15 @@ struct SeenScan {
 // Whether `now`, which comes after `last`, may show that the robot was carried between the two. `before` is the
 // agreement of `last`.
 [[nodiscard]] bool LooksCarried(const Trail& trail, const SeenScan& last, const SceneAgreement& before,
+                                const SeenScan& now);
+// The map of others in which a robot is followed that has no last keyframes, and where its track lies in it.
+struct FollowedMap {
+  const SearchedMap& map;
+  Pose2 T_map_track;
+};
+// How a scan agrees with that map, and the same question with it.
+[[nodiscard]] SceneAgreement AgreementWithMap(const FollowedMap& followed, const SeenScan& seen);
+[[nodiscard]] bool LooksCarried(const FollowedMap& followed, const SeenScan& last, const SceneAgreement& before,
                                 const SeenScan& now);
 // The share of the points compared that are contradicted between a scan and earlier ones since the robot is doubted.
 [[nodiscard]] double ConflictWith(std::span<const RecentScan> since, const SeenScan& now);

@@ -11,7 +11,7 @@ namespace cairn::slam {
 // When a place found in the map counts (place_search.h).
 struct PlaceSearchOptions {
   double cell_scale = 2.0;
-  double map_reach_m = 300.0;  // Only the map within this distance of the last pose is searched.
+  double map_reach_m = 300.0;  // A robot is looked for within this distance of its last pose in its map.
   double min_explained = 0.7;
   std::int64_t min_compared = 20;   // Points that must be compared for an agreement to count.
   std::int64_t near_keyframes = 4;  // Old keyframes that a scan is compared with, ...

@@ -11,6 +11,13 @@ namespace cairn::slam {
 
 namespace {
 
+// A robot looks for itself in the map around it. A session is compared with all of another one, and with all of itself:
+// a place proves nothing if another one anywhere looks the same.
+PlaceSearchOptions WithoutReach(PlaceSearchOptions options) {
+  options.map_reach_m = std::numeric_limits<double>::infinity();
+  return options;
+}
+
 // The steps alone, for a session in which no place was seen again: its snapshot has no relations then.
 std::vector<PoseRelation> StepsAlong(const std::vector<Pose2>& path, const MotionNoise& drift) {
   std::vector<PoseRelation> steps;
@@ -35,7 +42,7 @@ SessionMap::SessionMap(std::uint64_t session, const MapperSnapshot& snapshot, st
       relations_(MeasuredIn(snapshot, own_path, options.drift)),
       own_path_(std::move(own_path)),
       trail_(MotionNoise{}, options.surface),
-      place_(options.place),
+      place_(WithoutReach(options.place)),
       near_m_(options.self_check.near_m),
       places_(options.place, options.loop, options.self_check, options.align) {
   for (std::size_t k = 0; k < own_path_.size(); ++k) {

@@ -9,10 +9,14 @@ using Clock = SiteGrid::Clock;
 
 class GridTest : public testing::Test {
  protected:
-  GridTest() {
+  GridTest() { Info(0, 0); }
+
+  void Info(std::uint32_t epoch, std::uint32_t tile_count) {
     MapInfo info;
     info.site = "lab";
     info.resolution_m = 0.05;
+    info.epoch = epoch;
+    info.tile_count = tile_count;
     grid_.Take(info);
   }
 
@@ -122,6 +126,7 @@ TEST_F(GridTest, ANewEpochKeepsNothingOfTheOldOne) {
   Tile(0, 0, 1);
   Tile(1, 0, 1);
   static_cast<void>(After(std::chrono::milliseconds(0)));
+  Info(1, 1);
   Tile(1, 0, 9, 1);
   Tile(0, 0, 5, 0);  // Late, of the old one.
   const auto due = After(std::chrono::seconds(1));
@@ -131,9 +136,43 @@ TEST_F(GridTest, ANewEpochKeepsNothingOfTheOldOne) {
   EXPECT_EQ(At(whole, 0, 0), 9);
 }
 
+TEST_F(GridTest, AMapOfWhichTilesAreMissingIsNotPublishedAndTheOneBeforeIsAnswered) {
+  Info(0, 2);
+  Tile(0, 0, 1);
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(After(std::chrono::seconds(1), true)));
+  EXPECT_TRUE(grid_.Now(9).cells.empty());
+  Tile(1, 0, 1);
+  EXPECT_TRUE(std::holds_alternative<ros2::Grid>(After(std::chrono::seconds(0))));
+  Info(1, 2);
+  Tile(0, 0, 9, 1);
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(After(std::chrono::milliseconds(1500), true)));
+  EXPECT_EQ(At(grid_.Now(9), 0, 0), 1);
+  EXPECT_EQ(grid_.Now(9).width, 2U * kTileCells);
+  Tile(1, 0, 9, 1);
+  const auto due = After(std::chrono::milliseconds(100));  // Whoever began to listen meanwhile gets all of it.
+  EXPECT_EQ(At(std::get<ros2::Grid>(due), 0, 0), 9);
+  EXPECT_EQ(std::get<ros2::Grid>(due).width, 2U * kTileCells);
+  EXPECT_EQ(At(grid_.Now(9), 0, 0), 9);
+}
+
+TEST_F(GridTest, TilesThatDoNotComeAreNotWaitedForForEver) {
+  Info(0, 2);
+  Tile(0, 0, 1);
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(After(std::chrono::seconds(1))));
+  EXPECT_TRUE(std::holds_alternative<ros2::Grid>(After(SiteGrid::kCompleteWithin)));
+  EXPECT_EQ(At(grid_.Now(9), 0, 0), 1);
+  // The next whole change is waited for again.
+  Info(1, 2);
+  Tile(0, 0, 9, 1);
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(After(std::chrono::milliseconds(1500))));
+  EXPECT_EQ(At(grid_.Now(9), 0, 0), 1);
+  EXPECT_FALSE(std::holds_alternative<std::monostate>(After(SiteGrid::kCompleteWithin)));
+}
+
 TEST_F(GridTest, ASiteThatWasEmptiedBecomesUnknown) {
   Tile(0, 0, 1);
   static_cast<void>(After(std::chrono::milliseconds(0)));
+  Info(1, 0);
   Tile(0, 0, 0, 1, true);
   const auto due = After(std::chrono::seconds(6));
   EXPECT_EQ(At(std::get<ros2::Grid>(due), 0, 0), -1);

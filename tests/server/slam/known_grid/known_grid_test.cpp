@@ -6,30 +6,21 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <random>
 #include <variant>
 #include <vector>
 
 #include "server/slam/scan/beam_points.h"
-#include "server/slam/scan_pipeline.h"
+#include "tests/server/slam/known_grid/half_mapped.h"
 #include "tests/server/slam/ring_world.h"
-#include "tests/server/slam/simulated_drive.h"
 
 namespace cairn::slam {
 namespace {
 
-using Drive = test::Drive;
-
-std::shared_ptr<const KnownGrid> KnownGridOf(const OccupancyGrid& grid) {
-  const MapperOptions options;
-  KnownGrid::Tiles tiles;
-  grid.ForEachChunk([&](const ChunkKey& key, const GridChunk& chunk) {
-    tiles.emplace(key, std::make_shared<const TileCells>(OccupanciesOf(chunk)));
-  });
-  return std::make_shared<const KnownGrid>(KnownGrid::Source{std::move(tiles), grid.options().resolution_m, 0},
-                                           options.recovery.place, options.self_check.near_m);
-}
+using test::KnownGridOf;
+using test::Localised;
+using test::Mapped;
+using test::MappedOutcomes;
 
 // A room of 8 x 6 m, as scans from some places in it have drawn it.
 class KnownRoom : public ::testing::Test {
@@ -80,56 +71,6 @@ TEST_F(KnownRoom, ACellHasTheValueOfTheMap) {
   EXPECT_EQ(map_->At({50.0, 0.0}), kUnknownCell);
 }
 
-// A robot that has mapped the first half of a drive, and the records of the second.
-struct HalfMapped {
-  Drive drive = test::SimulatedDrive(240.0);
-  MapperOptions options;
-  std::shared_ptr<const KnownGrid> map;
-  std::size_t half = 0;
-
-  HalfMapped() {
-    options.filter.particles = 30;
-    ScanPipeline first(options, drive.T_map_robot_start, SerialFor,
-                       {.used = [](const Scan&, const ScanOutcome&) {}, .dropped = [](const Scan&, DropReason) {}});
-    half = drive.records.size() / 2;
-    for (std::size_t i = 0; i < half; ++i) AddTo(first, i);
-    map = KnownGridOf(first.mapper().grid());
-  }
-  void AddTo(ScanPipeline& pipeline, std::size_t record) const {
-    if (const auto* odometry = std::get_if<Odometry>(&drive.records[record])) return pipeline.Add(*odometry);
-    pipeline.Add(std::make_shared<const Scan>(std::get<Scan>(drive.records[record])));
-  }
-};
-
-const HalfMapped& Mapped() {
-  static const HalfMapped mapped;
-  return mapped;
-}
-
-struct Localised {
-  std::vector<ScanOutcome> outcomes;
-  ScanPipeline pipeline;
-
-  explicit Localised(const Pose2& start = {})
-      : pipeline(Mapped().options, start, SerialFor,
-                 {.used = [this](const Scan&, const ScanOutcome& outcome) { outcomes.push_back(outcome); },
-                  .dropped = [](const Scan&, DropReason) {}}) {}
-  void Add(std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) Mapped().AddTo(pipeline, i);
-  }
-  [[nodiscard]] std::size_t localized() const {
-    return static_cast<std::size_t>(
-        std::count_if(outcomes.begin(), outcomes.end(), [](const ScanOutcome& one) { return one.localized; }));
-  }
-};
-
-// The same records, mapped: for comparison.
-std::vector<ScanOutcome> MappedOutcomes() {
-  Localised mapping(Mapped().drive.T_map_robot_start);
-  mapping.Add(0, Mapped().drive.records.size());
-  return mapping.outcomes;
-}
-
 TEST(LocaliseIn, ARobotThatIsLookedForEverywhereIsFoundAndFollowed) {
   Localised robot;
   ASSERT_TRUE(robot.pipeline.mapper().LocaliseIn(Mapped().map, false));
@@ -138,7 +79,7 @@ TEST(LocaliseIn, ARobotThatIsLookedForEverywhereIsFoundAndFollowed) {
   ASSERT_GT(robot.outcomes.size(), 400U);
   EXPECT_FALSE(robot.outcomes.front().localized);
   EXPECT_GT(robot.localized(), robot.outcomes.size() * 8 / 10);
-  const std::vector<ScanOutcome> mapped = MappedOutcomes();
+  const std::vector<ScanOutcome>& mapped = MappedOutcomes();
   std::size_t compared = 0;
   for (const ScanOutcome& one : robot.outcomes) {
     const auto same =
@@ -265,7 +206,7 @@ TEST(LocaliseIn, AMapThatHasMovedIsLookedAtAgain) {
       true));
   const std::size_t before = robot.outcomes.size();
   robot.Add(Mapped().half, Mapped().drive.records.size());
-  const std::vector<ScanOutcome> mapped = MappedOutcomes();
+  const std::vector<ScanOutcome>& mapped = MappedOutcomes();
   const double shift_m = 2.0 * kTileCells * Mapped().map->source().resolution_m;
   std::size_t localized = 0;
   for (std::size_t i = before; i < robot.outcomes.size(); ++i) {

@@ -1,0 +1,105 @@
+// Robots that are only localised in the map of others, and that somebody carries between two scans.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "tests/server/slam/known_grid/half_mapped.h"
+
+namespace cairn::slam {
+namespace {
+
+using test::Localised;
+using test::Mapped;
+using test::MappedOutcomes;
+
+// What became of a robot that somebody has carried.
+struct Carried {
+  std::size_t wrong = 0;        // Scans at which the robot is localized and more than a metre off, ...
+  std::size_t wrong_later = 0;  // ... and those of them at which it has driven more than 2 m since.
+  bool noticed = false;
+  bool found_again = false;
+};
+
+// The robot is carried between two scans, although nothing is missing in what it sends. `from`, `to`: shares of the
+// part of the drive that was mapped. It stops at the first, and goes on from the second.
+Carried CarryUnseen(double from, double to, const MapperOptions& options) {
+  const auto& records = Mapped().drive.records;
+  const auto scan_at = [&](double share) {
+    auto i = static_cast<std::size_t>(share * static_cast<double>(Mapped().half));
+    while (!std::holds_alternative<Scan>(records[i])) ++i;
+    return i;
+  };
+  const auto odometry_before = [&](std::size_t i) {
+    while (!std::holds_alternative<Odometry>(records[i])) --i;
+    return std::get<Odometry>(records[i]).T_odom_robot;
+  };
+  const std::size_t last = scan_at(from), place = scan_at(to);
+  const Stamp last_stamp = std::get<Scan>(records[last]).stamp;
+  const Stamp earlier = std::get<Scan>(records[place]).stamp - last_stamp;
+  const Pose2 T_new_old = odometry_before(last) * odometry_before(place).Inverse();
+  Localised robot(Mapped().drive.T_map_robot_start, options);
+  EXPECT_TRUE(robot.pipeline.mapper().LocaliseIn(Mapped().map, true));
+  robot.Add(0, last + 1);
+  EXPECT_TRUE(robot.outcomes.back().localized);
+  const std::size_t before = robot.outcomes.size();
+  for (std::size_t i = place + 1; i < records.size() && robot.outcomes.size() < before + 250; ++i) {
+    if (const auto* const seen = std::get_if<Scan>(&records[i])) {
+      auto scan = std::make_shared<Scan>(*seen);
+      scan->stamp -= earlier;
+      scan->sequence = 0;
+      robot.pipeline.Add(std::move(scan));
+    } else {
+      auto odometry = std::get<Odometry>(records[i]);
+      odometry.stamp -= earlier;
+      odometry.sequence = 0;
+      odometry.T_odom_robot = T_new_old * odometry.T_odom_robot;
+      robot.pipeline.Add(odometry);
+    }
+  }
+  Carried result;
+  double way_m = 0.0;
+  std::optional<Pose2> truth_before;
+  for (const ScanOutcome& one : robot.outcomes) {
+    if (one.stamp <= last_stamp) continue;
+    const auto truth = std::find_if(MappedOutcomes().begin(), MappedOutcomes().end(),
+                                    [&](const ScanOutcome& other) { return other.stamp == one.stamp + earlier; });
+    if (truth == MappedOutcomes().end()) continue;
+    const Eigen::Vector2d p = truth->T_map_robot.translation();
+    if (truth_before) way_m += (p - truth_before->translation()).norm();
+    truth_before = truth->T_map_robot;
+    const bool wrong = one.localized && (one.T_map_robot.translation() - p).norm() > 1.0;
+    result.noticed = result.noticed || !one.localized;
+    result.wrong += wrong ? 1 : 0;
+    result.wrong_later += wrong && way_m > 2.0 ? 1 : 0;
+    result.found_again = one.localized && !wrong;
+  }
+  EXPECT_GT(way_m, 10.0);
+  return result;
+}
+
+TEST(LocaliseIn, ARobotThatIsCarriedBetweenTwoScansIsLostAtOnceAndFoundAgain) {
+  for (const auto& [from, to] : {std::pair(0.3, 0.7), std::pair(0.5, 0.2), std::pair(0.8, 0.4)}) {
+    const Carried carried = CarryUnseen(from, to, Mapped().options);
+    EXPECT_TRUE(carried.noticed) << from << " to " << to;
+    EXPECT_EQ(carried.wrong, 0U) << from << " to " << to;
+    EXPECT_TRUE(carried.found_again) << from << " to " << to;
+  }
+}
+
+// Also where nothing looks for it: a scan that neither matches nor shows the map is no reference for the next ones.
+TEST(LocaliseIn, ARobotWhoseScansShowNothingKnownIsNotLocalizedForLong) {
+  MapperOptions options = Mapped().options;
+  options.self_check.enabled = false;
+  for (const auto& [from, to] : {std::pair(0.5, 0.2), std::pair(0.8, 0.4)}) {
+    const Carried carried = CarryUnseen(from, to, options);
+    EXPECT_TRUE(carried.noticed) << from << " to " << to;
+    EXPECT_EQ(carried.wrong_later, 0U) << from << " to " << to;
+  }
+}
+
+}  // namespace
+}  // namespace cairn::slam
