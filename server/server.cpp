@@ -186,8 +186,9 @@ void Server::Stop() {
   if (dispatcher_.joinable()) dispatcher_.join();  // It first dispatches what the channel still holds.
   housekeeping_ = {};
   saved_sites_.Stop();
+  worker_.Cancel();
+  FinishSessions();  // Before the job has ended, because that may take as long as a search in a large map.
   worker_.Stop();
-  FinishSessions();
   atlas_.Close();
   robots_pool_.join();
   maps_pool_.join();

@@ -61,9 +61,13 @@ void JobWorker::Requeue(std::uint64_t id, bool enable) {
   if (!queue_.TryPush(Ticket{id, enable, {}})) list_.Fail(id, TooManyWait());
 }
 
-void JobWorker::Stop() {
+void JobWorker::Cancel() {
   queue_.Close();
   list_.CancelAll();
+}
+
+void JobWorker::Stop() {
+  Cancel();
   if (thread_.joinable()) thread_.join();
 }
 

@@ -32,7 +32,10 @@ class JobWorker {
   [[nodiscard]] Result<void> CheckRoom() const;
   // Queues a restored job, which is in the list already.
   void Requeue(std::uint64_t id, bool enable);
-  // Cancels the running and the waiting jobs. Returns when the thread has ended.
+  // Cancels the running and the waiting jobs, and takes no more. Does not wait: a job may be in the middle of a search
+  // that it cannot leave.
+  void Cancel();
+  // The same. Returns when the thread has ended.
   void Stop();
 
  private:

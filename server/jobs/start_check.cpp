@@ -29,11 +29,8 @@ void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::sha
   const RobotStatus status = session->record().snapshot().status;
   const auto site = atlas_.Find(status.session.site);
   if (site == nullptr || !status.pose.localized) return;
-  watched->comparing = true;
-  site->CheckStart(session->id(), status.pose.T_map_robot, [session, watched](const GridAgreement& agreement) {
-    const bool refuses = watched->judgement.Refuses(agreement);
-    watched->comparing = false;
-    if (!refuses) return false;
+  const auto ask = [session, comparing = std::make_shared<Comparing>(watched)](const GridAgreement& agreement) {
+    if (!comparing->judgement().Refuses(agreement)) return false;
     const std::string why =
         fmt::format("its start contradicts the map: {:.0f} % of the walls that it sees are free for others",
                     100.0 * agreement.contradicted_share());
@@ -42,7 +39,8 @@ void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::sha
                  session->record().state().robot, why);
     session->RefuseStart(why);
     return true;
-  });
+  };
+  site->CheckStart(session->id(), status.pose.T_map_robot, ask);
 }
 
 }  // namespace cairn::server

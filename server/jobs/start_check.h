@@ -8,6 +8,7 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <utility>
 
 #include "server/jobs/jobs_options.h"
 #include "server/jobs/start_judgement.h"
@@ -30,6 +31,18 @@ class StartCheck {
     double compared_at_m = 0.0;
     std::atomic<bool> comparing = false;
     StartJudgement judgement;  // On the site's strand.
+  };
+  // A comparison under way. It ends with what was asked of the site, also if that throws.
+  class Comparing {
+   public:
+    explicit Comparing(std::shared_ptr<Watched> watched) : watched_(std::move(watched)) { watched_->comparing = true; }
+    Comparing(const Comparing&) = delete;
+    Comparing& operator=(const Comparing&) = delete;
+    ~Comparing() { watched_->comparing = false; }
+    [[nodiscard]] StartJudgement& judgement() const { return watched_->judgement; }
+
+   private:
+    std::shared_ptr<Watched> watched_;
   };
   void Compare(const std::shared_ptr<Session>& session, const std::shared_ptr<Watched>& watched) const;
 

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <exception>
 #include <latch>
 #include <optional>
 #include <random>
@@ -274,7 +275,14 @@ void Atlas::ShareMemory(const std::vector<std::shared_ptr<Site>>& sites) const {
 void Atlas::Close() {
   const auto sites = All();
   std::latch open(static_cast<std::ptrdiff_t>(sites.size()));
-  for (const auto& site : sites) site->Close([&open] { open.count_down(); });
+  for (const auto& site : sites) {
+    try {
+      site->Close([&open] { open.count_down(); });
+    } catch (const std::exception& error) {
+      spdlog::error("the end of a site failed with an exception: {}", error.what());
+      open.count_down();
+    }
+  }
   open.wait();
 }
 

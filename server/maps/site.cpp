@@ -41,13 +41,10 @@ void Site::LogFailure(const std::exception& error) const {
 
 void Site::Change(GridChange&& change) {
   const MutexLock lock(mutex_);
-  const bool first = waiting_ == nullptr;
-  if (first) waiting_ = std::make_shared<Changes>();
-  Drawing& newest = (*waiting_)[change.session];
-  for (auto& [key, chunk] : change.chunks) newest.chunks.insert_or_assign(key, std::move(chunk));
-  if (change.drawn.path != nullptr) newest.drawn = std::move(change.drawn);
-  if (!first) return;
-  Post([changes = waiting_](Site& site) {
+  if (waiting_ != nullptr) return Merge(std::move(change), *waiting_);
+  const auto changes = std::make_shared<Changes>();
+  Merge(std::move(change), *changes);
+  Post([changes](Site& site) {
     {
       const MutexLock reading(site.mutex_);
       if (site.waiting_ == changes) site.waiting_.reset();
@@ -55,6 +52,13 @@ void Site::Change(GridChange&& change) {
     // `changes` is final now.
     for (const auto& [session, drawing] : *changes) site.Apply(session, drawing);
   });
+  waiting_ = changes;  // Only now: nobody takes what was not posted.
+}
+
+void Site::Merge(GridChange&& change, Changes& into) {
+  Drawing& newest = into[change.session];
+  for (auto& [key, chunk] : change.chunks) newest.chunks.insert_or_assign(key, std::move(chunk));
+  if (change.drawn.path != nullptr) newest.drawn = std::move(change.drawn);
 }
 
 void Site::Apply(SessionId session, const Drawing& drawing) {
@@ -203,14 +207,19 @@ void Site::Publish(std::function<void()> then, Clock::time_point now) {
     if (then) then();
     return;
   }
-  Run([then = std::move(then), now](Site& site) {
-    site.publish_waits_ = false;
-    site.ExpireDisagreement(now);
-    site.Render();
-    site.StayWithinMemory(now);
-    site.Send();
-    if (then) then();
-  });
+  try {
+    Run([then = std::move(then), now](Site& site) {
+      site.publish_waits_ = false;
+      site.ExpireDisagreement(now);
+      site.Render();
+      site.StayWithinMemory(now);
+      site.Send();
+      if (then) then();
+    });
+  } catch (...) {
+    publish_waits_ = false;  // Otherwise nothing would ever be published again.
+    throw;
+  }
 }
 
 void Site::Probe(std::function<void()> done) {

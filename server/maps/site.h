@@ -194,7 +194,8 @@ class Site : public std::enable_shared_from_this<Site> {
   };
   using Changes = std::map<SessionId, Drawing>;
 
-  // Does `act` on the strand, after everything that was asked for before.
+  static void Merge(GridChange&& change, Changes& into);
+  // Does `act` on the strand, after everything that was asked for before. If that throws, nothing was asked for.
   template <typename Act>
   void Run(Act act) CAIRN_EXCLUDES(mutex_);
   template <typename Act>
@@ -339,14 +340,19 @@ void Site::Run(Act act) {
 template <typename Act>
 void Site::Post(Act act) {
   ++asked_;
-  asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable {
-    try {
-      act(*self);
-    } catch (const std::exception& error) {
-      self->LogFailure(error);
-    }
-    ++self->handled_;
-  });
+  try {
+    asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable {
+      try {
+        act(*self);
+      } catch (const std::exception& error) {
+        self->LogFailure(error);
+      }
+      ++self->handled_;
+    });
+  } catch (...) {
+    --asked_;  // Otherwise the site would seem to be busy for ever.
+    throw;
+  }
 }
 
 template <typename Act>

@@ -301,6 +301,27 @@ TEST(JobWorker, ItsEndCancelsTheRunningJob) {
   EXPECT_EQ(list.Find(1)->state, JobState::kCancelled);
 }
 
+// The sessions of a server that stops must not wait for a search that cannot be left.
+TEST(JobWorker, CancellingDoesNotWaitForAJobThatDoesNotEnd) {
+  Outbound outbound(32);
+  JobList list({}, outbound, [] { return Stamp{0}; });
+  BoundedChannel<bool> started(1), ended(1);
+  JobWorker worker({}, list, [&](const Job&, bool, const JobControl& control) {
+    EXPECT_TRUE(started.TryPush(true));
+    EXPECT_TRUE(ended.Pop());
+    EXPECT_TRUE(control.cancelled());
+    return Result<JobOutcome>(Fail(StatusCode::kCancelled, "cancelled"));
+  });
+  ASSERT_TRUE(worker.Submit("lab", JobKind::kRelocalise, true));
+  worker.Start();
+  EXPECT_TRUE(started.Pop());
+  worker.Cancel();
+  EXPECT_FALSE(worker.Submit("lab", JobKind::kSmooth, true));
+  EXPECT_TRUE(ended.TryPush(true));
+  worker.Stop();
+  EXPECT_EQ(list.Find(1)->state, JobState::kCancelled);
+}
+
 TEST(JobWorker, RunsJobsAtTheConfiguredPriority) {
   JobsOptions options;
   options.nice = 7;

@@ -1,36 +1,12 @@
 // The memory may end at any moment while a session is opened: the server goes on, nothing half open is left, and the
 // robot's next request is served. Every allocation of the thread that opens the session fails once, but for the small
-// ones: Asio does not survive that of a strand's mutex (40 bytes).
+// ones (failing_memory.h).
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <new>
 
 #include "tests/server/robots/roster_fixture.h"
-
-namespace {
-
-thread_local long allocations_left = -1;  // Below 0: all succeed.
-constexpr std::size_t kSmall = 64;
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  if (size > kSmall && allocations_left == 0) {
-    allocations_left = -1;  // What is needed to say so succeeds.
-    throw std::bad_alloc();
-  }
-  if (size > kSmall && allocations_left > 0) --allocations_left;
-  if (void* const memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-// Not inlined: gcc then sees `free` beside `new` and takes it for a mistake.
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
+#include "tests/server/support/failing_memory.h"
 
 namespace cairn::server {
 namespace {
@@ -52,10 +28,7 @@ TEST_F(RosterTest, WhicheverAllocationFailsTheNextRequestOpensTheSession) {
     const ClientId client = 100 + static_cast<ClientId>(fails_at);
     const SessionRequest request = RequestOf(robot, client);
     Suspend(roster().All().front()->record().owner());
-    allocations_left = fails_at;
-    roster().Take(request);
-    failed = allocations_left < 0;
-    allocations_left = -1;
+    failed = test::FailsAtAllocation(fails_at, [&] { roster().Take(request); });
     const bool told = LastState(robot, client).status.code == StatusCode::kUnavailable;
     refused += told ? 1 : 0;
     EXPECT_TRUE(!told || roster().Find(robot) == nullptr) << "allocation " << fails_at << ": half open";
