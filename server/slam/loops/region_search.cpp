@@ -22,125 +22,19 @@ void MaxAhead(const std::uint8_t* from, std::uint8_t* to, std::size_t count, std
 // the likelihood tolerates.
 constexpr double kFullDetailM = 15.0;
 
-// A square block of translations at one heading, with an upper bound of their scores.
-struct Block {
-  int turn = 0;  // Index of the heading.
-  int x = 0;     // Lowest translation, in cells.
-  int y = 0;
-  std::int64_t bound = 0;  // Upper bound of the sum over the points.
-};
+// The points in another order, in which each part of them is spread over all.
+std::vector<Eigen::Vector2d> Spread(std::span<const Eigen::Vector2d> points) {
+  std::vector<Eigen::Vector2d> spread;
+  spread.reserve(points.size());
+  for (std::size_t first = 0; first < LikelihoodPyramid::kParts; ++first)
+    for (std::size_t i = first; i < points.size(); i += LikelihoodPyramid::kParts) spread.push_back(points[i]);
+  return spread;
+}
 
-class BranchAndBound {
- public:
-  BranchAndBound(std::span<const Eigen::Vector2d> points, const LikelihoodPyramid& pyramid, const SearchWindow& window,
-                 std::span<const Exclusion> exclusions)
-      : pyramid_(pyramid), window_(window), exclusions_(exclusions) {
-    double farthest = 1.0;
-    for (const Eigen::Vector2d& p : points) farthest = std::max(farthest, p.norm());
-    step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
-    reach_turns_ = std::max(1, static_cast<int>(std::ceil(window.reach_rad / step_rad_)));
-    reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
-    for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
-      const Pose2& centre = window.T_ref_curr_centre;
-      const Transform2 pose({centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)});
-      std::vector<LikelihoodPyramid::Cell>& cells = turned_.emplace_back();
-      cells.reserve(points.size());
-      for (const Eigen::Vector2d& p : points) {
-        const Eigen::Vector2d p_ref = pose * p;
-        cells.push_back({static_cast<int>(std::floor(p_ref.x() / pyramid.cell_m())),
-                         static_cast<int>(std::floor(p_ref.y() / pyramid.cell_m()))});
-      }
-    }
-  }
-
-  std::optional<RegionPeak> Run(double min_score) {
-    const double full = 255.0 * static_cast<double>(turned_.front().size());
-    best_.bound = static_cast<std::int64_t>(min_score * full);
-    std::vector<Block> top;
-    const int level = pyramid_.levels() - 1;
-    const int side = 1 << level;
-    std::vector<std::int64_t> bounds(static_cast<std::size_t>(2 * reach_cells_ / side + 1));  // Those of a row.
-    for (int turn = 0; turn < static_cast<int>(turned_.size()) && scored_ <= kMaxBlocks; ++turn) {
-      for (int y = -reach_cells_; y <= reach_cells_ && scored_ <= kMaxBlocks; y += side) {
-        scored_ += static_cast<int>(bounds.size());
-        pyramid_.SumsOfRow(turned_[static_cast<std::size_t>(turn)], -reach_cells_, y, bounds);
-        int x = -reach_cells_;
-        for (const std::int64_t bound : bounds) {
-          if (bound > best_.bound) top.push_back({turn, x, y, bound});
-          x += side;
-        }
-      }
-    }
-    if (scored_ <= kMaxBlocks) {
-      std::erase_if(top, [&](const Block& block) { return Excluded(block, level); });
-      Search(std::move(top), level);
-    }
-    const bool complete = scored_ <= kMaxBlocks;
-    if (!found_ && complete) return std::nullopt;
-    return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
-  }
-
- private:
-  [[nodiscard]] Pose2 PoseOf(const Block& block) const {
-    const Pose2& centre = window_.T_ref_curr_centre;
-    return {centre.x + block.x * pyramid_.cell_m(), centre.y + block.y * pyramid_.cell_m(),
-            WrapAngle(centre.theta + (block.turn - reach_turns_) * step_rad_)};
-  }
-
-  [[nodiscard]] bool Excluded(const Block& block, int level) const {
-    if (exclusions_.empty()) return false;
-    const Pose2 low = PoseOf(block);
-    // The whole block must lie inside, so its farthest corner is checked.
-    const double side = ((1 << level) - 1) * pyramid_.cell_m();
-    return std::any_of(exclusions_.begin(), exclusions_.end(), [&](const Exclusion& one) {
-      if (std::abs(AngleDiff(low.theta, one.T_ref_curr.theta)) > one.radius_rad) return false;
-      const double dx = std::max(std::abs(low.x - one.T_ref_curr.x), std::abs(low.x + side - one.T_ref_curr.x));
-      const double dy = std::max(std::abs(low.y - one.T_ref_curr.y), std::abs(low.y + side - one.T_ref_curr.y));
-      return std::hypot(dx, dy) <= one.radius_m;
-    });
-  }
-
-  void Descend(std::vector<Block> blocks, int level) {
-    std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
-    for (Block& block : blocks) {
-      if (++scored_ > kMaxBlocks) return;
-      block.bound =
-          pyramid_.SumOfBest(level, turned_[static_cast<std::size_t>(block.turn)], block.x, block.y, best_.bound);
-    }
-    Search(std::move(blocks), level);
-  }
-
-  // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
-  void Search(std::vector<Block> blocks, int level) {
-    std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.bound > b.bound; });
-    for (const Block& block : blocks) {
-      if (block.bound <= best_.bound) return;
-      if (level == 0) {
-        best_ = block;
-        found_ = true;
-        return;
-      }
-      const int half = 1 << (level - 1);
-      std::vector<Block> parts;
-      for (const int dy : {0, half})
-        for (const int dx : {0, half})
-          if (block.x + dx <= reach_cells_ && block.y + dy <= reach_cells_)
-            parts.push_back({block.turn, block.x + dx, block.y + dy, 0});
-      Descend(std::move(parts), level - 1);
-    }
-  }
-
-  const LikelihoodPyramid& pyramid_;
-  const SearchWindow window_;
-  const std::span<const Exclusion> exclusions_;
-  double step_rad_ = 0.0;
-  int reach_turns_ = 0;
-  int reach_cells_ = 0;
-  std::vector<std::vector<LikelihoodPyramid::Cell>> turned_;  // The cells of the points at each heading.
-  Block best_;
-  bool found_ = false;
-  int scored_ = 0;
-};
+// The first cell of a part.
+std::size_t BeginOf(std::size_t part, const LikelihoodPyramid::Pattern& pattern) {
+  return part * pattern.cells.size() / LikelihoodPyramid::kParts;
+}
 
 }  // namespace
 
@@ -222,24 +116,176 @@ void LikelihoodPyramid::SumsOfRow(std::span<const Cell> cells, int x, int y, std
   }
 }
 
-std::int64_t LikelihoodPyramid::SumOfBest(int level, std::span<const Cell> cells, int x, int y,
-                                          std::int64_t enough) const {
-  constexpr std::size_t kAtOnce = 32;
+LikelihoodPyramid::Pattern LikelihoodPyramid::PatternOf(std::vector<Cell> cells) const {
+  Pattern pattern{std::move(cells), {}, {}, {}};
+  if (!pattern.cells.empty()) pattern.low = pattern.high = pattern.cells.front();
+  pattern.offsets.reserve(pattern.cells.size());
+  for (const Cell& cell : pattern.cells) {
+    pattern.offsets.push_back(cell.y * width_ + cell.x);
+    pattern.low = {std::min(pattern.low.x, cell.x), std::min(pattern.low.y, cell.y)};
+    pattern.high = {std::max(pattern.high.x, cell.x), std::max(pattern.high.y, cell.y)};
+  }
+  return pattern;
+}
+
+LikelihoodPyramid::SumsFrom LikelihoodPyramid::MostOf(const Pattern& pattern) {
+  SumsFrom most{};
+  for (std::size_t part = 0; part < kParts; ++part)
+    most[part] = 255 * static_cast<std::int32_t>(pattern.cells.size() - BeginOf(part, pattern));
+  return most;
+}
+
+LikelihoodPyramid::SumsFrom LikelihoodPyramid::SumsOfBest(int level, const Pattern& pattern, int x, int y,
+                                                          std::int32_t enough, const SumsFrom& at_most) const {
   const std::uint8_t* raster = levels_[static_cast<std::size_t>(level)].data();
   const int to_column = x + kPad - low_x_, to_row = y + kPad - low_y_;
   const auto width = static_cast<std::uint32_t>(width_), height = static_cast<std::uint32_t>(height_);
-  std::int64_t sum = 0;
-  for (std::size_t first = 0; first < cells.size(); first += kAtOnce) {
-    const auto left = cells.subspan(first);
-    if (sum + 255 * static_cast<std::int64_t>(left.size()) <= enough) return sum;
-    for (const Cell& cell : left.first(std::min(kAtOnce, left.size()))) {
-      // As unsigned numbers, cells to the left and below are too large as well.
-      const auto column = static_cast<std::uint32_t>(cell.x + to_column),
-                 row = static_cast<std::uint32_t>(cell.y + to_row);
-      if (column < width && row < height) sum += raster[static_cast<std::size_t>(row) * width + column];
+  const bool inside = pattern.low.x + to_column >= 0 && pattern.high.x + to_column < width_ &&
+                      pattern.low.y + to_row >= 0 && pattern.high.y + to_row < height_;
+  const std::ptrdiff_t origin = std::ptrdiff_t{to_row} * width_ + to_column;
+  SumsFrom sums{};
+  std::int32_t sum = 0;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    if (sum + at_most[part] <= enough) return {sum};
+    std::int32_t of_part = 0;
+    const std::size_t end = BeginOf(part + 1, pattern);
+    if (inside) {
+      for (std::size_t i = BeginOf(part, pattern); i < end; ++i) of_part += raster[origin + pattern.offsets[i]];
+    } else {
+      for (std::size_t i = BeginOf(part, pattern); i < end; ++i) {
+        // As unsigned numbers, cells to the left and below are too large as well.
+        const auto column = static_cast<std::uint32_t>(pattern.cells[i].x + to_column),
+                   row = static_cast<std::uint32_t>(pattern.cells[i].y + to_row);
+        if (column < width && row < height) of_part += raster[static_cast<std::size_t>(row) * width + column];
+      }
+    }
+    sums[part] = of_part;
+    sum += of_part;
+  }
+  for (std::size_t part = kParts; part-- > 0;) sums[part] += sums[part + 1];
+  return sums;
+}
+
+PoseSearch::PoseSearch(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
+                       const SearchWindow& window)
+    : pyramid_(&pyramid), window_(window), full_(255.0 * static_cast<double>(points_curr.size())) {
+  double farthest = 1.0;
+  for (const Eigen::Vector2d& p : points_curr) farthest = std::max(farthest, p.norm());
+  step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
+  reach_turns_ = std::max(1, static_cast<int>(std::ceil(window.reach_rad / step_rad_)));
+  reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
+  const std::vector<Eigen::Vector2d> points = Spread(points_curr);
+  for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
+    const Pose2& centre = window.T_ref_curr_centre;
+    const Transform2 pose({centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)});
+    std::vector<LikelihoodPyramid::Cell> cells;
+    cells.reserve(points.size());
+    for (const Eigen::Vector2d& p : points) {
+      const Eigen::Vector2d p_ref = pose * p;
+      cells.push_back({static_cast<int>(std::floor(p_ref.x() / pyramid.cell_m())),
+                       static_cast<int>(std::floor(p_ref.y() / pyramid.cell_m()))});
+    }
+    turned_.push_back(pyramid.PatternOf(std::move(cells)));
+  }
+}
+
+void PoseSearch::Begin(double min_score, std::span<const Exclusion> exclusions, bool any) {
+  exclusions_.assign(exclusions.begin(), exclusions.end());
+  any_ = any;
+  looked_at_all_ = false;
+  left_.clear();
+  best_ = {};
+  best_.sums.front() = static_cast<std::int32_t>(min_score * full_);
+  found_ = false;
+  scored_ = 0;
+}
+
+bool PoseSearch::GoOn(int blocks) {
+  const int end = blocks < kMaxBlocks - scored_ ? scored_ + blocks : kMaxBlocks;
+  if (!looked_at_all_) LookAtAll();
+  // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
+  while (!left_.empty() && scored_ <= kMaxBlocks && !(any_ && found_)) {
+    if (scored_ > end) return false;
+    const Block block = left_.back();
+    left_.pop_back();
+    if (block.bound() <= best_.bound()) continue;
+    if (block.level > 0) {
+      Divide(block);
+    } else {
+      best_ = block;
+      found_ = true;
     }
   }
-  return sum;
+  return true;
+}
+
+std::optional<RegionPeak> PoseSearch::peak() const {
+  const bool complete = scored_ <= kMaxBlocks;
+  if (!found_ && complete) return std::nullopt;
+  return RegionPeak{PoseOf(best_), best_.bound() / full_, complete};
+}
+
+// The blocks of the coarsest level.
+void PoseSearch::LookAtAll() {
+  looked_at_all_ = true;
+  const int level = pyramid_->levels() - 1, side = 1 << level;
+  std::vector<std::int64_t> bounds(static_cast<std::size_t>(2 * reach_cells_ / side + 1));  // Those of a row.
+  for (int turn = 0; turn < static_cast<int>(turned_.size()) && scored_ <= kMaxBlocks; ++turn) {
+    const Pattern& pattern = turned_[static_cast<std::size_t>(turn)];
+    for (int y = -reach_cells_; y <= reach_cells_ && scored_ <= kMaxBlocks; y += side) {
+      scored_ += static_cast<int>(bounds.size());
+      pyramid_->SumsOfRow(pattern.cells, -reach_cells_, y, bounds);
+      int x = -reach_cells_;
+      for (const std::int64_t bound : bounds) {
+        Block block{turn, x, y, level, {}};
+        x += side;
+        if (bound <= best_.bound()) continue;
+        block.sums = LikelihoodPyramid::MostOf(pattern);
+        block.sums.front() = static_cast<std::int32_t>(bound);
+        if (!Excluded(block)) left_.push_back(block);
+      }
+    }
+  }
+  // Of equal ones the first is the next.
+  std::ranges::reverse(left_);
+  std::ranges::stable_sort(left_, {}, &Block::bound);
+}
+
+// Puts those of the four quarters of the block that may hold a better pose before all that are left.
+void PoseSearch::Divide(const Block& block) {
+  const int level = block.level - 1, half = 1 << level;
+  const auto first = std::ssize(left_);
+  for (const int dy : {0, half}) {
+    for (const int dx : {0, half}) {
+      Block part{block.turn, block.x + dx, block.y + dy, level, {}};
+      if (part.x > reach_cells_ || part.y > reach_cells_ || Excluded(part)) continue;
+      if (++scored_ > kMaxBlocks) return;
+      part.sums = pyramid_->SumsOfBest(level, PatternOf(part), part.x, part.y, best_.bound(), block.sums);
+      if (part.bound() <= best_.bound()) continue;
+      auto at = left_.end();
+      while (at - left_.begin() > first && (at - 1)->bound() >= part.bound()) --at;
+      left_.insert(at, part);
+    }
+  }
+}
+
+Pose2 PoseSearch::PoseOf(const Block& block) const {
+  const Pose2& centre = window_.T_ref_curr_centre;
+  return {centre.x + block.x * pyramid_->cell_m(), centre.y + block.y * pyramid_->cell_m(),
+          WrapAngle(centre.theta + (block.turn - reach_turns_) * step_rad_)};
+}
+
+bool PoseSearch::Excluded(const Block& block) const {
+  if (exclusions_.empty()) return false;
+  const Pose2 low = PoseOf(block);
+  // The whole block must lie inside, so its farthest corner is checked.
+  const double side = ((1 << block.level) - 1) * pyramid_->cell_m();
+  return std::any_of(exclusions_.begin(), exclusions_.end(), [&](const Exclusion& one) {
+    if (std::abs(AngleDiff(low.theta, one.T_ref_curr.theta)) > one.radius_rad) return false;
+    const double dx = std::max(std::abs(low.x - one.T_ref_curr.x), std::abs(low.x + side - one.T_ref_curr.x));
+    const double dy = std::max(std::abs(low.y - one.T_ref_curr.y), std::abs(low.y + side - one.T_ref_curr.y));
+    return std::hypot(dx, dy) <= one.radius_m;
+  });
 }
 
 std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
@@ -253,7 +299,10 @@ std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_c
                                        const SearchWindow& window, double min_score,
                                        std::span<const Exclusion> exclusions) {
   if (points_curr.empty()) return std::nullopt;
-  return BranchAndBound(points_curr, pyramid, window, exclusions).Run(min_score);
+  PoseSearch search(points_curr, pyramid, window);
+  search.Begin(min_score, exclusions);
+  search.GoOn(kMaxBlocks);
+  return search.peak();
 }
 
 }  // namespace cairn::slam

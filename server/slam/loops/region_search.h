@@ -5,6 +5,8 @@
 // Source: branch and bound of Hess et al., ICRA 2016, section V.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -37,8 +39,22 @@ class LikelihoodPyramid {
     int x = 0;
     int y = 0;
   };
-  // The sum of Best over cells that are moved by (x, y), or, if it is at most `enough`, any number that is.
-  [[nodiscard]] std::int64_t SumOfBest(int level, std::span<const Cell> cells, int x, int y, std::int64_t enough) const;
+  // The cells of points at one heading, in kParts parts.
+  static constexpr std::size_t kParts = 8;
+  struct Pattern {
+    std::vector<Cell> cells;
+    std::vector<std::int32_t> offsets;  // Of the cells within the rasters of the pyramid that it was made for.
+    Cell low, high;                     // No cell is lower or higher.
+  };
+  [[nodiscard]] Pattern PatternOf(std::vector<Cell> cells) const;
+  // Sums over the parts from each part on: the first is the sum over all cells.
+  using SumsFrom = std::array<std::int32_t, kParts + 1>;
+  // The sums of Best over the cells of a pattern that is moved by (x, y), or, if that over all cells is at most
+  // `enough`, any numbers of which the first is so. `at_most`: no sum is larger.
+  [[nodiscard]] SumsFrom SumsOfBest(int level, const Pattern& pattern, int x, int y, std::int32_t enough,
+                                    const SumsFrom& at_most) const;
+  // Sums that none exceeds.
+  [[nodiscard]] static SumsFrom MostOf(const Pattern& pattern);
   // For each element i of `sums` the sum of Best on the coarsest level over cells that are moved by
   // (x + i * 2^level, y): a row of blocks side by side, in a fraction of the time that they would take one by one.
   void SumsOfRow(std::span<const Cell> cells, int x, int y, std::span<std::int64_t> sums) const;
@@ -79,8 +95,63 @@ struct Exclusion {
   double radius_rad = 0.2;
 };
 
-// Returns the best pose with a score above `min_score`, or nothing. At most kMaxBlocks blocks are evaluated.
+// At most so many blocks are evaluated by a search.
 inline constexpr int kMaxBlocks = 1'000'000;
+
+// A search that can be done in several parts, for a caller that has not the time to wait for all of it. The pyramid
+// must outlive it. Copyable.
+class PoseSearch {
+ public:
+  using Pattern = LikelihoodPyramid::Pattern;
+
+  PoseSearch(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
+             const SearchWindow& window);
+
+  // Begins to look for the best pose with a score above `min_score`, without those near any of `exclusions`. `any`: the
+  // search ends at the first pose that it finds.
+  void Begin(double min_score, std::span<const Exclusion> exclusions = {}, bool any = false);
+  // Goes on until about so many blocks more are evaluated. Returns whether the search has ended.
+  bool GoOn(int blocks);
+  // Of a search that has ended.
+  [[nodiscard]] std::optional<RegionPeak> peak() const;
+
+ private:
+  // A square block of translations at one heading, with an upper bound of their scores.
+  struct Block {
+    int turn = 0;  // Index of the heading.
+    int x = 0;     // Lowest translation, in cells.
+    int y = 0;
+    int level = 0;
+    LikelihoodPyramid::SumsFrom sums{};  // Upper bounds of the sums over the points.
+
+    [[nodiscard]] std::int32_t bound() const { return sums.front(); }
+  };
+  [[nodiscard]] Pose2 PoseOf(const Block& block) const;
+  [[nodiscard]] bool Excluded(const Block& block) const;
+  [[nodiscard]] const Pattern& PatternOf(const Block& block) const {
+    return turned_[static_cast<std::size_t>(block.turn)];
+  }
+  void LookAtAll();
+  void Divide(const Block& block);
+
+  const LikelihoodPyramid* pyramid_;
+  SearchWindow window_;
+  double step_rad_ = 0.0;
+  int reach_turns_ = 0;
+  int reach_cells_ = 0;
+  double full_ = 0.0;            // The sum over the points if all lie on a surface.
+  std::vector<Pattern> turned_;  // The cells of the points at each heading.
+
+  std::vector<Exclusion> exclusions_;
+  bool any_ = false;
+  bool looked_at_all_ = false;
+  std::vector<Block> left_;  // Those that may hold a better pose; the next one comes last.
+  Block best_;
+  bool found_ = false;
+  int scored_ = 0;
+};
+
+// Returns the best pose with a score above `min_score`, or nothing.
 [[nodiscard]] std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr,
                                                      const LikelihoodPyramid& pyramid, const SearchWindow& window,
                                                      double min_score,

@@ -27,14 +27,55 @@ Exclusion ApartFrom(const Pose2& T_ref_curr) {
   return {T_ref_curr, kRivalBeyondM, kRivalBeyondRad};
 }
 
+UniquePoseSearch::UniquePoseSearch(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
+                                   const SearchWindow& window, double max_rival)
+    : sample_(SampleOf(surfaces_curr)),
+      pyramid_(&pyramid_ref),
+      max_rival_(max_rival),
+      search_(sample_, pyramid_ref, window) {
+  search_.Begin(kMinLikelihood);
+}
+
+void UniquePoseSearch::LookFirstIn(const SearchWindow& likely) {
+  const auto peak = FindBestPose(sample_, *pyramid_, likely, kMinLikelihood);
+  if (!peak || !peak->complete) return;
+  // The best pose may be outside if this one is at the edge.
+  const Pose2 off = Between(likely.T_ref_curr_centre, peak->T_ref_curr);
+  if (off.translation().norm() > 0.5 * likely.reach_m || std::abs(off.theta) > 0.5 * likely.reach_rad) return;
+  LookForRivals(*peak, Step::kRivalOfLikely);
+}
+
+void UniquePoseSearch::LookForRivals(const RegionPeak& of, Step step) {
+  best_ = of.T_ref_curr;
+  const Exclusion own = ApartFrom(best_);
+  search_.Begin(max_rival_ * of.score, std::span(&own, 1), true);
+  step_ = step;
+}
+
+bool UniquePoseSearch::GoOn(int blocks) {
+  if (step_ == Step::kEnded) return true;
+  if (!search_.GoOn(blocks)) return false;
+  const auto peak = search_.peak();
+  if (step_ == Step::kRivalOfLikely && peak) {  // The best pose may be another one.
+    search_.Begin(kMinLikelihood);
+    step_ = Step::kBest;
+    return false;
+  }
+  if (step_ == Step::kBest && peak && peak->complete) {
+    LookForRivals(*peak, Step::kRival);
+    return false;
+  }
+  if (step_ != Step::kBest && !peak) found_ = best_;
+  step_ = Step::kEnded;
+  return true;
+}
+
 std::optional<Pose2> FindUniquePose(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
                                     const SearchWindow& window, double max_rival) {
-  const std::vector<Eigen::Vector2d> sample = SampleOf(surfaces_curr);
-  const auto peak = FindBestPose(sample, pyramid_ref, window, kMinLikelihood);
-  if (!peak || !peak->complete) return std::nullopt;
-  if (FindBestPose(sample, pyramid_ref, window, max_rival * peak->score, ApartFrom(peak->T_ref_curr)))
-    return std::nullopt;
-  return peak->T_ref_curr;
+  UniquePoseSearch search(surfaces_curr, pyramid_ref, window, max_rival);
+  while (!search.GoOn(kMaxBlocks)) {
+  }
+  return search.found();
 }
 
 Eigen::Matrix3d UniquePoseCovariance() {

@@ -3,6 +3,7 @@
 // agree. Stateless, thread-safe, deterministic.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -24,6 +25,32 @@ inline constexpr double kFoundSigmaRad = 0.01;    // Standard deviation of the h
 [[nodiscard]] std::optional<Pose2> FindUniquePose(std::span<const SurfacePoint> surfaces_curr,
                                                   const LikelihoodPyramid& pyramid_ref, const SearchWindow& window,
                                                   double max_rival);
+
+// The same search, done in several parts. The pyramid must outlive it. Copyable.
+class UniquePoseSearch {
+ public:
+  UniquePoseSearch(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
+                   const SearchWindow& window, double max_rival);
+  // The pose is probably in this small part of the window. This saves time: if it is there, it is searched for rivals
+  // only.
+  void LookFirstIn(const SearchWindow& likely);
+  // Goes on until about so many blocks more are evaluated. Returns whether the search has ended.
+  bool GoOn(int blocks);
+  // Of a search that has ended.
+  [[nodiscard]] const std::optional<Pose2>& found() const { return found_; }
+
+ private:
+  enum class Step : std::uint8_t { kBest, kRivalOfLikely, kRival, kEnded };
+  void LookForRivals(const RegionPeak& of, Step step);
+
+  std::vector<Eigen::Vector2d> sample_;
+  const LikelihoodPyramid* pyramid_;
+  double max_rival_;
+  PoseSearch search_;
+  Step step_ = Step::kBest;
+  Pose2 best_;
+  std::optional<Pose2> found_;
+};
 
 // The points with which poses are compared: at most 250 of the surfaces, spread over all of them.
 [[nodiscard]] std::vector<Eigen::Vector2d> SampleOf(std::span<const SurfacePoint> surfaces);

@@ -56,6 +56,23 @@ std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, co
   return Fit(map, recent, surfaces, *unique, UniquePoseCovariance());
 }
 
+void PlaceSearch::Begin(const SearchedMap& map, std::span<const RecentScan> recent,
+                        const std::optional<Pose2>& T_map_believed) {
+  search_.reset();
+  if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return;
+  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
+  if (surfaces.size() < kMinSurfaces) return;
+  search_.emplace(Search{{surfaces, index_->pyramid, index_->window, loop_.max_rival}, recent.back().T_track_robot});
+  if (T_map_believed) search_->poses.LookFirstIn({*T_map_believed, options_.near_m, options_.near_rad});
+}
+
+std::optional<FoundPlace> PlaceSearch::End(const SearchedMap& map, std::span<const RecentScan> recent) {
+  const Search search = *std::exchange(search_, std::nullopt);
+  if (!search.poses.found()) return std::nullopt;
+  const Pose2 T_map_robot = *search.poses.found() * Between(search.T_track_robot, recent.back().T_track_robot);
+  return Fit(map, recent, SurfacesOf(recent, options_.cell_scale * kSearchCellM), T_map_robot, UniquePoseCovariance());
+}
+
 RankedPlaces PlaceSearch::Rank(const SearchedMap& map, std::span<const RecentScan> recent, std::size_t most,
                                const std::function<bool()>& go_on) {
   RankedPlaces ranked;
@@ -94,7 +111,11 @@ bool PlaceSearch::FitsElsewhere(const SearchedMap& map, std::span<const RecentSc
                                 double score) {
   const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
   const IndexedSurfaces& index = IndexOf(map);
-  return FindBestPose(points, index.pyramid, index.window, score, ApartFrom(T_map_robot)).has_value();
+  const Exclusion own = ApartFrom(T_map_robot);
+  PoseSearch search(points, index.pyramid, index.window);
+  search.Begin(score, std::span(&own, 1), true);
+  search.GoOn(kMaxBlocks);
+  return search.peak().has_value();
 }
 
 std::optional<FoundPlace> PlaceSearch::Fit(const SearchedMap& map, std::span<const RecentScan> recent,

@@ -66,6 +66,17 @@ class PlaceSearch {
   // The place of the last of the scans, which are in the order of time. REQUIRES: the map does not change between two
   // calls, unless Forget is called.
   [[nodiscard]] std::optional<FoundPlace> Find(const SearchedMap& map, std::span<const RecentScan> recent);
+  // The same in several parts, for a caller that has not the time to wait for all of it. With `T_map_believed`, where
+  // the last of the scans is believed to be, it takes less time if it is there.
+  void Begin(const SearchedMap& map, std::span<const RecentScan> recent, const std::optional<Pose2>& T_map_believed);
+  // Whether a search has begun, and nothing has ended it.
+  [[nodiscard]] bool searching() const { return search_.has_value(); }
+  // Goes on until about so many blocks more are evaluated (PoseSearch). Returns whether nothing is left to search.
+  // REQUIRES: searching.
+  [[nodiscard]] bool GoOn(int blocks) { return search_->poses.GoOn(blocks); }
+  // Ends a search of which nothing is left. Returns the place of the last of `recent`, which go on from those at Begin.
+  [[nodiscard]] std::optional<FoundPlace> End(const SearchedMap& map, std::span<const RecentScan> recent);
+  void Stop() { search_.reset(); }
   // The same, in the part of the map around a pose where the last of the scans is believed to be: within
   // PlaceSearchOptions::near_m and near_rad, or farther.
   [[nodiscard]] std::optional<FoundPlace> FindNear(const SearchedMap& map, std::span<const RecentScan> recent,
@@ -76,7 +87,10 @@ class PlaceSearch {
   // REQUIRES: as Find.
   [[nodiscard]] RankedPlaces Rank(const SearchedMap& map, std::span<const RecentScan> recent, std::size_t most,
                                   const std::function<bool()>& go_on);
-  void Forget() { index_.reset(); }
+  void Forget() {
+    search_.reset();
+    index_.reset();
+  }
   // How well the surfaces of these scans fit, with the last of them at this pose and as seen best with a search of some
   // cells around it, 0..1. REQUIRES: as Find.
   [[nodiscard]] double ScoreAt(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot);
@@ -104,6 +118,11 @@ class PlaceSearch {
   SelfCheckOptions check_;
   PointToLineOptions align_;
   std::shared_ptr<const IndexedSurfaces> index_;  // Asked for at the first search.
+  struct Search {
+    UniquePoseSearch poses;
+    Pose2 T_track_robot;  // Of the last scan at its begin.
+  };
+  std::optional<Search> search_;  // In `index_`.
 };
 
 }  // namespace cairn::slam

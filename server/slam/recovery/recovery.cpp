@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "server/slam/scan/beam_points.h"
@@ -24,6 +25,10 @@ constexpr double kDriftPerM = 0.01;
 constexpr double kDriftRadPerM = 0.0005;
 constexpr double kFarthestM = 10.0;
 constexpr double kEverywhereEveryM = 4.0;
+// Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
+// its path is waited for by nobody. One that is lost is to be found soon.
+constexpr int kBlocksOnPath = 60'000;
+constexpr int kBlocksLost = 200'000;
 
 }  // namespace
 
@@ -70,6 +75,11 @@ void Recovery::ForgetScans() {
   LeavePath();
   recent_.clear();
   unconfirmed_.clear();
+  StopSearch();
+}
+
+void Recovery::StopSearch() {
+  search_.Stop();
   searched_at_m_ = kNever;
 }
 
@@ -114,6 +124,7 @@ std::vector<Pose2> Recovery::Unconfirmed() const {
 }
 
 void Recovery::LeavePath() {
+  if (T_map_track_) StopSearch();  // It began where the path leads.
   doubt_.reset();
   T_map_track_.reset();
   held_.clear();
@@ -128,16 +139,23 @@ Pose2 Recovery::FromLast(const Pose2& T_track_robot) const {
 }
 
 void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot) {
-  const double travelled_m =
-      has_scans() ? recent_.back().travelled_m + FromLast(step.T_track_robot).translation().norm() : 0.0;
+  double travelled_m = 0.0;
+  if (has_scans()) {
+    const double before_m = recent_.back().travelled_m;
+    // It grows with each scan, so that it says which scan is meant.
+    travelled_m = std::max(before_m + FromLast(step.T_track_robot).translation().norm(),
+                           std::nextafter(before_m, std::numeric_limits<double>::infinity()));
+  }
   recent_.push_back({keyframe.scan.Share(), step.T_track_robot, travelled_m, std::move(points_robot)});
-  while (recent_.size() > kMaxRecent || travelled_m - recent_.front().travelled_m > kStretchM)
+  // Not those that are being searched for.
+  while (!search_.searching() && (recent_.size() > kMaxRecent || travelled_m - recent_.front().travelled_m > kStretchM))
     recent_.erase(recent_.begin());
   if (held_.size() > kMaxHeld) LeavePath();
 }
 
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
                                               std::vector<SurfacePoint> points_robot, const SearchedMap& map) {
+  if (std::exchange(restored_, false)) SearchAgain(map);
   Append(keyframe, step, std::move(points_robot));
   if (doubt_ && !was_carried()) return std::nullopt;
   if (auto place = ConfirmSuggestion()) {
@@ -155,17 +173,50 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
     const auto [reach_m, reach_rad] = followed ? ReachOfTrack() : std::pair(0.0, 0.0);
     const auto place = search_.FindNear(map, recent_, T_map_robot, reach_m, reach_rad);
     // Farther from where the track leads, one search is no proof.
-    if (place && (!followed || IsNear(T_map_robot, place->T_map_robot) || IsConfirmed(place->T_map_robot)))
+    if (place && (!followed || IsNear(T_map_robot, place->T_map_robot) ||
+                  IsConfirmed(place->T_map_robot, recent_.back().travelled_m)))
       return Found{*place, false};
   }
-  const double travelled_m = recent_.back().travelled_m;
-  const double every_m = followed ? kEverywhereEveryM : loop_.every_m;
-  if (searched_at_m_ == kNever && followed) searched_at_m_ = travelled_m;
-  if (searched_at_m_ != kNever && travelled_m - searched_at_m_ < every_m) return std::nullopt;
-  searched_at_m_ = travelled_m;
-  const auto place = search_.Find(map, recent_);
-  if (!place || !IsConfirmed(place->T_map_robot)) return std::nullopt;
+  const auto place = SearchOn(map);
+  if (!place) return std::nullopt;
   return Found{*place, T_map_track_ && IsNear(T_map_robot, place->T_map_robot)};
+}
+
+// Searches on in the whole map. Returns the robot's place once two searches agree.
+std::optional<FoundPlace> Recovery::SearchOn(const SearchedMap& map) {
+  const double travelled_m = recent_.back().travelled_m;
+  if (search_.searching()) {
+    if (!search_.GoOn(BlocksPerScan())) return std::nullopt;
+    auto place = search_.End(map, recent_);
+    if (place && IsConfirmed(place->T_map_robot, searched_at_m_)) return place;
+  }
+  const bool followed = said_ && T_map_track_.has_value();
+  double every_m = followed ? kEverywhereEveryM : loop_.every_m;
+  if (!unconfirmed_.empty()) every_m = std::max(every_m, loop_.confirm_after_m);
+  const bool due =
+      searched_at_m_ == kNever ? !followed || travelled_m >= every_m : travelled_m - searched_at_m_ >= every_m;
+  if (due) BeginSearch(map, recent_);
+  return std::nullopt;
+}
+
+void Recovery::BeginSearch(const SearchedMap& map, std::span<const RecentScan> recent) {
+  searched_at_m_ = recent.back().travelled_m;
+  std::optional<Pose2> T_map_believed;
+  if (T_map_track_) T_map_believed = *T_map_track_ * recent.back().T_track_robot;
+  search_.Begin(map, recent, T_map_believed);
+}
+
+int Recovery::BlocksPerScan() const {
+  return T_map_track_ ? kBlocksOnPath : kBlocksLost;
+}
+
+// After a restart: one part was done with each scan since the search began.
+void Recovery::SearchAgain(const SearchedMap& map) {
+  const auto last = std::ranges::find(recent_, searched_at_m_, &RecentScan::travelled_m);
+  if (last == recent_.end()) return;
+  BeginSearch(map, {recent_.begin(), last + 1});
+  for (auto scan = last + 1; scan != recent_.end() && search_.searching(); ++scan)
+    if (search_.GoOn(BlocksPerScan())) search_.Stop();
 }
 
 bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const {
@@ -182,7 +233,7 @@ std::pair<double, double> Recovery::ReachOfTrack() const {
 }
 
 // All places found within kConfirmWithinM of way must agree.
-bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
+bool Recovery::IsConfirmed(const Pose2& T_map_robot, double seen_m) {
   const RecentScan& now = recent_.back();
   // That of a job is one of them.
   if (suggestion_ && !Agree(suggestion_->place, T_map_robot)) {
@@ -193,8 +244,8 @@ bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
       (now.travelled_m - unconfirmed_.back().travelled_m > kConfirmWithinM || !Agree(unconfirmed_.back(), T_map_robot)))
     unconfirmed_.clear();
   const bool confirmed = !unconfirmed_.empty() && Agree(unconfirmed_.front(), T_map_robot) &&
-                         now.travelled_m - unconfirmed_.front().travelled_m >= loop_.confirm_after_m;
-  unconfirmed_.push_back({T_map_robot * now.T_track_robot.Inverse(), now.travelled_m});
+                         seen_m - unconfirmed_.front().travelled_m >= loop_.confirm_after_m;
+  unconfirmed_.push_back({T_map_robot * now.T_track_robot.Inverse(), seen_m});
   return confirmed;
 }
 

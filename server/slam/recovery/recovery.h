@@ -11,6 +11,8 @@
 //  - A robot that may have been carried between two scans (carried.h) is first held on its path as well, if its scans
 //    match. It is looked for if within kMostDoubtedM of way they have not shown that nobody has carried it, and at once
 //    where a scan does not match. It goes on along its path if that was not likely and it is found nowhere else.
+//  - The whole map is searched in parts, one with each scan taken, so that no scan takes long. Which parts are done
+//    follows from the scans since it began, so that a restarted server goes on in the same way.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
 //    where the track leads, and elsewhere by two that agree, like all others.
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
@@ -18,6 +20,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -97,6 +100,7 @@ class Recovery {
   void ForgetMap() {
     suggestion_.reset();
     unconfirmed_.clear();
+    StopSearch();
     search_.Forget();
   }
   // A job has found the robot in another map: it was at `T_map_robot` when it saw the scan of this stamp. From now on
@@ -168,6 +172,7 @@ class Recovery {
     if (has_doubt) archive(self.doubt_);
     if constexpr (Archive::kReads) {
       self.search_.Forget();
+      self.restored_ = true;
       self.suggestion_.reset();  // Not saved (Mapper::has_suggestion).
       archive.Require(!self.doubt_ || (self.active_ && !self.said_ && self.on_path()),
                       "a robot that may have been carried");
@@ -199,9 +204,15 @@ class Recovery {
   [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
   void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
   void LeavePath();
+  void BeginSearch(const SearchedMap& map, std::span<const RecentScan> recent);
+  void StopSearch();
+  void SearchAgain(const SearchedMap& map);
+  [[nodiscard]] int BlocksPerScan() const;
+  [[nodiscard]] std::optional<FoundPlace> SearchOn(const SearchedMap& map);
   [[nodiscard]] std::pair<double, double> ReachOfTrack() const;
   [[nodiscard]] bool IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const;
-  [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
+  // `seen_m`: the way at the last of the scans that were searched for.
+  [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot, double seen_m);
   [[nodiscard]] bool Agree(const Candidate& earlier, const Pose2& T_map_robot) const;
 
   RecoveryOptions options_;
@@ -218,7 +229,8 @@ class Recovery {
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.
   std::optional<Doubt> doubt_;
-  double searched_at_m_ = 0.0;
+  double searched_at_m_ = 0.0;  // The way at the last of the scans that are, or were last, searched for everywhere.
+  bool restored_ = false;       // What has been searched for in parts is still to be searched for again.
   std::vector<RecentScan> recent_;
   std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.
   std::vector<Candidate> unconfirmed_;

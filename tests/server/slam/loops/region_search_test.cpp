@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <random>
+#include <vector>
+
+#include "server/slam/loops/unique_pose.h"
 
 namespace cairn::slam {
 namespace {
@@ -26,6 +29,20 @@ std::vector<Eigen::Vector2d> SeenFrom(const Pose2& T_ref_curr, const std::vector
   std::vector<Eigen::Vector2d> points;
   for (std::size_t i = 0; i < world.size(); i += 3) points.push_back(T_ref_curr.Inverse() * world[i].p);
   return points;
+}
+
+std::vector<SurfacePoint> Corridor() {
+  std::vector<SurfacePoint> corridor;
+  for (double x = -15; x < 15; x += 0.05)
+    for (const double y : {-1.0, 1.0}) corridor.push_back({{x, y}, Eigen::Vector2d::UnitY()});
+  return corridor;
+}
+
+std::vector<Eigen::Vector2d> PieceOfCorridor() {
+  std::vector<Eigen::Vector2d> piece;
+  for (double x = -5; x < 5; x += 0.1)
+    for (const double y : {-1.0, 1.0}) piece.emplace_back(x, y);
+  return piece;
 }
 
 TEST(LikelihoodPyramid, EveryLevelBoundsTheFinest) {
@@ -54,25 +71,36 @@ TEST(LikelihoodPyramid, FallsFromThePointsToNothing) {
 }
 
 TEST(LikelihoodPyramid, ASumEndsOnlyWhereItCannotBeEnough) {
-  const LikelihoodPyramid pyramid(Hall(), kCellM, 0.3, 5);
+  using Pyramid = LikelihoodPyramid;
+  const Pyramid pyramid(Hall(), kCellM, 0.3, 5);
   std::mt19937_64 rng(2);
   std::uniform_int_distribution<int> cell(-30, 110), move(-100, 100);
   std::uniform_real_distribution<double> share(0.0, 1.0);
   int ended = 0, whole = 0;
   for (int run = 0; run < 2000; ++run) {
-    std::vector<LikelihoodPyramid::Cell> cells(static_cast<std::size_t>(1 + run % 150));
+    std::vector<Pyramid::Cell> cells(static_cast<std::size_t>(1 + run % 150));
     for (auto& one : cells) one = {cell(rng), cell(rng)};
+    const Pyramid::Pattern pattern = pyramid.PatternOf(cells);
     const int level = run % pyramid.levels(), x = run % 2 == 0 ? 0 : move(rng), y = run % 3 == 0 ? 0 : move(rng);
-    std::int64_t sum = 0;
-    for (const auto& one : cells) sum += pyramid.Best(level, one.x + x, one.y + y);
-    const auto enough = static_cast<std::int64_t>(share(rng) * 255.0 * static_cast<double>(cells.size()));
-    const std::int64_t found = pyramid.SumOfBest(level, cells, x, y, enough);
-    if (sum > enough) {
-      ASSERT_EQ(found, sum) << run;
+    const auto sums_on = [&](int of_level) {
+      Pyramid::SumsFrom sums{};
+      for (std::size_t part = 0; part < Pyramid::kParts; ++part)
+        for (std::size_t i = part * cells.size() / Pyramid::kParts; i < cells.size(); ++i)
+          sums[part] += pyramid.Best(of_level, cells[i].x + x, cells[i].y + y);
+      return sums;
+    };
+    const Pyramid::SumsFrom sums = sums_on(level);
+    const auto enough = static_cast<std::int32_t>(share(rng) * 255.0 * static_cast<double>(cells.size()));
+    // The bounds of a coarser level are smaller than those that hold everywhere.
+    const bool bounded = run % 4 < 2 && level + 1 < pyramid.levels();
+    const Pyramid::SumsFrom found =
+        pyramid.SumsOfBest(level, pattern, x, y, enough, bounded ? sums_on(level + 1) : Pyramid::MostOf(pattern));
+    if (sums.front() > enough) {
+      ASSERT_EQ(found, sums) << run;
       ++whole;
     } else {
-      ASSERT_LE(found, enough) << run;
-      ended += found < sum ? 1 : 0;
+      ASSERT_LE(found.front(), enough) << run;
+      ended += found.front() < sums.front() ? 1 : 0;
     }
   }
   EXPECT_GT(whole, 100);
@@ -107,14 +135,72 @@ TEST(RegionSearch, AgreesWithTryingEveryPose) {
   }
 }
 
+TEST(RegionSearch, InPartsItFindsTheSame) {
+  const std::vector<SurfacePoint> hall = Hall();
+  const LikelihoodPyramid pyramid(hall, kCellM, 0.3, 5);
+  const std::vector<Eigen::Vector2d> points = SeenFrom({2.3, -1.9, 0.3}, hall);
+  const SearchWindow window{{}, 4.0, 0.4};
+  const auto at_once = FindBestPose(points, pyramid, window, 0.3);
+  PoseSearch search(points, pyramid, window);
+  search.Begin(0.3);
+  int parts = 1;
+  for (; !search.GoOn(200); ++parts) ASSERT_LT(parts, 1000);
+  EXPECT_GT(parts, 3);
+  ASSERT_TRUE(at_once && search.peak());
+  EXPECT_EQ(search.peak()->T_ref_curr, at_once->T_ref_curr);
+  EXPECT_EQ(search.peak()->score, at_once->score);
+}
+
+TEST(RegionSearch, AnyPoseIsFoundSoonerThanTheBest) {
+  const LikelihoodPyramid along(Corridor(), kCellM, 0.3, 5);
+  PoseSearch search(PieceOfCorridor(), along, {{0.3, 0.2, 0.05}, 4.0, 0.2});
+  const auto parts = [&](bool any, double min_score) {
+    search.Begin(min_score, {}, any);
+    int count = 1;
+    while (!search.GoOn(20)) ++count;
+    return count;
+  };
+  const int best = parts(false, 0.3);
+  EXPECT_LT(parts(true, 0.3), best);
+  ASSERT_TRUE(search.peak());
+  EXPECT_GT(search.peak()->score, 0.3);
+  parts(true, 0.999);
+  EXPECT_FALSE(search.peak());
+}
+
+// A pose that is likely saves the search for the best one, and changes nothing if it is wrong.
+TEST(UniquePoseSearch, LooksFirstWhereThePoseIsLikely) {
+  const std::vector<SurfacePoint> hall = Hall();
+  const LikelihoodPyramid pyramid(hall, kCellM, 0.3, 5);
+  const Pose2 truth{1.4, -1.1, 0.2};
+  std::vector<SurfacePoint> seen;
+  for (const Eigen::Vector2d& p : SeenFrom(truth, hall)) seen.push_back({p, Eigen::Vector2d::UnitX()});
+  const SearchWindow window{{}, 4.0, 0.4};
+  const auto parts = [&](UniquePoseSearch& search) {
+    int count = 1;
+    while (!search.GoOn(50)) ++count;
+    return count;
+  };
+  UniquePoseSearch plain(seen, pyramid, window, 0.9), right = plain, wrong = plain;
+  right.LookFirstIn({{1.5, -1.0, 0.22}, 1.0, 0.3});
+  wrong.LookFirstIn({{-2.0, 2.0, -0.2}, 1.0, 0.3});
+  const int all = parts(plain);
+  EXPECT_LT(parts(right), all);
+  EXPECT_GE(parts(wrong), all);
+  ASSERT_TRUE(plain.found() && right.found() && wrong.found());
+  EXPECT_EQ(*plain.found(), *FindUniquePose(seen, pyramid, window, 0.9));
+  EXPECT_EQ(*wrong.found(), *plain.found());
+  EXPECT_LT((right.found()->translation() - truth.translation()).norm(), 0.15);
+  // A place that is likely is none if others look alike.
+  UniquePoseSearch alike(seen, pyramid, window, 0.2);
+  alike.LookFirstIn({{1.5, -1.0, 0.22}, 1.0, 0.3});
+  parts(alike);
+  EXPECT_FALSE(alike.found());
+}
+
 TEST(RegionSearch, ACorridorHasARivalAndAHallHasNone) {
-  std::vector<SurfacePoint> corridor;
-  for (double x = -15; x < 15; x += 0.05)
-    for (const double y : {-1.0, 1.0}) corridor.push_back({{x, y}, Eigen::Vector2d::UnitY()});
-  const LikelihoodPyramid along(corridor, kCellM, 0.3, 5);
-  std::vector<Eigen::Vector2d> piece;
-  for (double x = -5; x < 5; x += 0.1)
-    for (const double y : {-1.0, 1.0}) piece.emplace_back(x, y);
+  const LikelihoodPyramid along(Corridor(), kCellM, 0.3, 5);
+  const std::vector<Eigen::Vector2d> piece = PieceOfCorridor();
   const SearchWindow window{{0.3, 0.2, 0.05}, 4.0, 0.2};
   const auto peak = FindBestPose(piece, along, window, 0.3);
   ASSERT_TRUE(peak);
