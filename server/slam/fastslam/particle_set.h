@@ -140,6 +140,11 @@ class ParticleSet {
   template <typename MakePose>
   void RemakePaths(std::size_t size, std::size_t apart, const MakePose& pose);
   void Summarise(const std::vector<double>& shares);
+  // The most likely particle of all, or, if another place has more than twice the weight of its place, the most likely
+  // one there. Two particles are at one place if the squared Mahalanobis distance between their positions, with the
+  // covariance `apart`, is at most kMaxNis.
+  [[nodiscard]] std::size_t MostLikelyWhereTheWeightIs(std::size_t likeliest, const std::vector<double>& shares,
+                                                       const Eigen::Matrix2d& apart) const;
   // Of the particles near a pose the one whose whole path is the most likely; if none is near, the nearest one.
   [[nodiscard]] std::size_t MostLikelyNear(const Pose2& T_map_robot) const;
 
