@@ -73,8 +73,8 @@ class ParticleSet {
     Particle& particle = particles_[index];
     const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
     const double nis = Nis<N>(innovation.v, S);
-    AddLogLikelihood(index, LogDensity<N>(std::min(nis, kMaxNis), S));
-    if (nis < kMaxNis) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
+    AddLogLikelihood(index, LogDensity<N>(std::min(nis, kMaxNis<N>), S));
+    if (nis < kMaxNis<N>) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
   // Updates the error ensemble with an observation of something first seen from `keyframe`. `innovation` is
   // that of the best particle.
