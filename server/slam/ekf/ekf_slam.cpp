@@ -53,7 +53,7 @@ bool EkfSlam::Observe(const RevisitObservation& revisit) {
   const Innovation<3>& innovation = seen.innovation;
   const double nis =
       Nis<3>(innovation.v, state_.InnovationCovariance<3, 3>(innovation.J_z_pose, seen.at, seen.J_z_anchor, seen.R));
-  const bool explained = nis < kMaxNis;
+  const bool explained = nis < kMaxNis<3>;
   contradictions_.Add(explained);
   if (!explained) return false;
   nis_.Add(nis, 3);

@@ -80,7 +80,7 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
     innovations.push_back(InnovateRevisit(particle.path[revisit.keyframe], particle.T_map_robot, revisit));
     nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
   }
-  if (!(nearest < kMaxNis)) return false;
+  if (!(nearest < kMaxNis<3>)) return false;
   MixtureInnovation<3> mixture;
   const std::vector<double> before = weights();
   for (std::size_t i = 0; i < particles_.size(); ++i)
@@ -181,15 +181,16 @@ void ParticleSet::RemakePaths(std::size_t size, std::size_t apart, const MakePos
 // whenever another one becomes the most likely. Therefore all particles take part that the stated doubt covers.
 void ParticleSet::Summarise(const std::vector<double>& shares) {
   const auto likeliest = std::ranges::max_element(particles_, {}, &Particle::log_likelihood);
-  const Pose2 centre = likeliest->T_map_robot;
-  const Eigen::Matrix2d near = kAgreementM * kAgreementM / kMaxNis * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d near = kAgreementM * kAgreementM / kMaxNis<2> * Eigen::Matrix2d::Identity();
   // Two poses that are drawn from the same doubt are apart by twice its covariance.
-  const Eigen::Matrix2d apart = 2.0 * errors_.covariance(centre).topLeftCorner<2, 2>() + near;
+  const Eigen::Matrix2d apart = 2.0 * errors_.covariance(likeliest->T_map_robot).topLeftCorner<2, 2>() + near;
+  const auto first = static_cast<std::size_t>(likeliest - particles_.begin());
+  const Pose2 centre = particles_[MostLikelyWhereTheWeightIs(first, shares, apart)].T_map_robot;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double sum = 0.0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector3d d = Minus(particles_[i].T_map_robot, centre);
-    if (Nis<2>(d.head<2>(), apart) > kMaxNis) continue;
+    if (Nis<2>(d.head<2>(), apart) > kMaxNis<2>) continue;
     mean += shares[i] * d;
     sum += shares[i];
   }
@@ -203,10 +204,39 @@ void ParticleSet::Summarise(const std::vector<double>& shares) {
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector3d d = Minus(particles_[i].T_map_robot, centre) - mean;
     spread += shares[i] * d.cwiseAbs2();
-    if (d.dot(whiten.solve(d)) > kMaxNis) estimate_.covariance += shares[i] * d * d.transpose();
+    if (d.dot(whiten.solve(d)) > kMaxNis<3>) estimate_.covariance += shares[i] * d * d.transpose();
   }
   const Eigen::Vector3d variance = covariance.diagonal().cwiseMax(1e-12);
   spread_share_ = std::min(1.0, spread.cwiseQuotient(variance).mean());
+}
+
+// The likelihood of a whole path outlives resampling, and every observation counts for at most kMaxNis in it. So a
+// single particle can have the likeliest path while nearly all of the weight is elsewhere.
+std::size_t ParticleSet::MostLikelyWhereTheWeightIs(std::size_t likeliest, const std::vector<double>& shares,
+                                                    const Eigen::Matrix2d& apart) const {
+  const Eigen::Matrix2d information = apart.inverse();
+  const auto at_one_place = [&](std::size_t a, std::size_t b) {
+    const Eigen::Vector2d d = particles_[a].T_map_robot.translation() - particles_[b].T_map_robot.translation();
+    return d.dot(information * d) <= kMaxNis<2>;
+  };
+  const auto weight_around = [&](std::size_t i) {
+    double weight = 0.0;
+    for (std::size_t j = 0; j < particles_.size(); ++j) weight += at_one_place(i, j) ? shares[j] : 0.0;
+    return weight;
+  };
+  std::size_t heaviest = likeliest;
+  double most = 2.0 * weight_around(likeliest);
+  if (most >= 1.0) return likeliest;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const double weight = weight_around(i);
+    if (weight <= most) continue;
+    most = weight;
+    heaviest = i;
+  }
+  std::size_t chosen = heaviest;
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    if (at_one_place(i, heaviest) && particles_[i].log_likelihood > particles_[chosen].log_likelihood) chosen = i;
+  return chosen;
 }
 
 // The particle whose path is believed: it has to end where the robot is said to be.

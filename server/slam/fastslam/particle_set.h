@@ -73,8 +73,8 @@ class ParticleSet {
     Particle& particle = particles_[index];
     const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
     const double nis = Nis<N>(innovation.v, S);
-    AddLogLikelihood(index, LogDensity<N>(std::min(nis, kMaxNis), S));
-    if (nis < kMaxNis) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
+    AddLogLikelihood(index, LogDensity<N>(std::min(nis, kMaxNis<N>), S));
+    if (nis < kMaxNis<N>) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
   // Updates the error ensemble with an observation of something first seen from `keyframe`. `innovation` is
   // that of the best particle.
@@ -140,6 +140,11 @@ class ParticleSet {
   template <typename MakePose>
   void RemakePaths(std::size_t size, std::size_t apart, const MakePose& pose);
   void Summarise(const std::vector<double>& shares);
+  // The most likely particle of all, or, if another place has more than twice the weight of its place, the most likely
+  // one there. Two particles are at one place if the squared Mahalanobis distance between their positions, with the
+  // covariance `apart`, is at most kMaxNis.
+  [[nodiscard]] std::size_t MostLikelyWhereTheWeightIs(std::size_t likeliest, const std::vector<double>& shares,
+                                                       const Eigen::Matrix2d& apart) const;
   // Of the particles near a pose the one whose whole path is the most likely; if none is near, the nearest one.
   [[nodiscard]] std::size_t MostLikelyNear(const Pose2& T_map_robot) const;
 

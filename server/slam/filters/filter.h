@@ -24,9 +24,14 @@
 
 namespace cairn::slam {
 
-// Largest squared Mahalanobis distance that an observation may count for. With a larger value contradicting
-// observations raise the doubt about the pose further. Half or twice the value changes no error (study `sensitivity`).
-inline constexpr double kMaxNis = 16.0;
+// Largest squared Mahalanobis distance that an observation of N numbers may count for: for every N the chi-square
+// quantile of the same share of true observations, 99.89 %. With a larger value contradicting observations raise the
+// doubt about the pose further. Half or twice the value changes no error (study `sensitivity`).
+template <int N>
+inline constexpr double kMaxNis = [] {
+  static_assert(1 <= N && N <= 3);
+  return N == 1 ? 10.5949 : N == 2 ? 13.5640 : 16.0;
+}();
 
 // Options that all filters of the mapper share: the drift of the motion that they receive, landmarks, and
 // when a filter counts as diverged.

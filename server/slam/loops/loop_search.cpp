@@ -64,15 +64,12 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& 
   std::vector<LoopClosure> found;
   for (const std::size_t old : Candidates(trail, path)) {
     const Pose2 guess = Between(path[old], path[shapes.size() - 1]);
-    if (const auto closure = Compare(trail, old, guess)) found.push_back(*closure);
+    if (const auto closure = Compare(trail, old, guess, 0)) found.push_back(*closure);
   }
   for (const LoopClosure& closure : found) {
-    for (const LoopClosure& earlier : unconfirmed_) {
-      if (here_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
-      if (!Agree(earlier, closure, shapes)) continue;
-      unconfirmed_.clear();
-      return closure;
-    }
+    if (!Confirms(trail, path, closure)) continue;
+    unconfirmed_.clear();
+    return closure;
   }
   unconfirmed_.insert(unconfirmed_.end(), found.begin(), found.end());
   return std::nullopt;
@@ -106,12 +103,28 @@ std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePa
   return best.Take();
 }
 
-std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old,
-                                               const Pose2& T_old_recent_guess) const {
+// Two stretches of 15 m that end some metres apart show nearly the same. Where that looks like another place, both
+// agree on the wrong one. So what has been seen since the earlier of the two must show the same by itself.
+bool LoopSearch::Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure) const {
+  const std::span<const KeyframeShape> shapes = trail.shapes();
+  const Pose2 guess = Between(path[closure.old], path[closure.recent]);
+  for (const LoopClosure& earlier : unconfirmed_) {
+    if (shapes[closure.recent].travelled_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
+    if (!Agree(earlier, closure, shapes)) continue;
+    // It is the earliest one, since which the robot has seen the most.
+    const auto alone = Compare(trail, closure.old, guess, earlier.recent + 1);
+    return alone && Agree(earlier, *alone, shapes);
+  }
+  return false;
+}
+
+std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old, const Pose2& T_old_recent_guess,
+                                               std::size_t since) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double way_m = trail.distances_m()[old];
   const std::size_t now = shapes.size() - 1;
-  const Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
+  Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
+  recent_stretch.first = std::max(recent_stretch.first, since);
   if (old >= recent_stretch.first) return std::nullopt;  // This is the present place, not an old one.
   const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
   const auto T_old_recent = MatchStretches(trail, old_stretch, trail, recent_stretch,

@@ -1,9 +1,9 @@
 // Finds large loops: places seen so long ago that their position relative to the robot is very uncertain. It
 // compares the surfaces seen over the last metres (not one scan) with the surroundings of old keyframes, over
 // a search window as wide as the uncertainty. A match is accepted only if no other pose fits nearly as well,
-// if no surface lies where beams passed, and if a second comparison some metres later agrees. It prefers a
-// late closure to a wrong one. Small loops are found by RevisitSearch. Not thread-safe.
-// Source: matching by branch and bound as in Hess et al., ICRA 2016; confirmation by agreement between
+// if no surface lies where beams passed, and if a second comparison some metres later agrees, also without the
+// scans of the first one. It prefers a late closure to a wrong one. Small loops are found by RevisitSearch. Not
+// thread-safe. Source: matching by branch and bound as in Hess et al., ICRA 2016; confirmation by agreement between
 // closures as in Olson 2009 (Recognizing places using spectrally clustered local matches), in its simplest
 // form.
 #pragma once
@@ -70,9 +70,11 @@ class LoopSearch {
 
  private:
   [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const PosePath& path) const;
-  // Compares the surroundings of the last keyframe with those of `old`.
-  [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old,
-                                                   const Pose2& T_old_recent_guess) const;
+  // Compares the surroundings of the last keyframe, as seen from keyframe `since` on, with those of `old`.
+  [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old, const Pose2& T_old_recent_guess,
+                                                   std::size_t since) const;
+  // Whether an unconfirmed loop agrees with `closure`, and with what has been seen since that one alone.
+  [[nodiscard]] bool Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure) const;
   [[nodiscard]] bool Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const;
   [[nodiscard]] double Reach(double way_m) const;
 

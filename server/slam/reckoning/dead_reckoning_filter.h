@@ -73,7 +73,7 @@ class DeadReckoningFilter final : public SinglePathFilter {
 
   void Predict(const StepMotion& step) override { path_.Advance(step.T_prev_curr, step.covariance_prev); }
   bool Observe(const RevisitObservation& revisit) override {
-    contradictions_.Add(path_.NisOf(revisit) < kMaxNis);
+    contradictions_.Add(path_.NisOf(revisit) < kMaxNis<3>);
     return false;
   }
   void Observe(const KeyframeSight& /*sight*/, const ParallelFor& /*parallel_for*/) override {}

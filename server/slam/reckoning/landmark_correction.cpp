@@ -23,7 +23,7 @@ void LandmarkCorrection::Predict(const StepMotion& step) {
 }
 
 bool LandmarkCorrection::Observe(const RevisitObservation& revisit) {
-  contradictions_.Add(path_.NisOf(revisit) < kMaxNis);
+  contradictions_.Add(path_.NisOf(revisit) < kMaxNis<3>);
   return false;
 }
 
@@ -71,7 +71,7 @@ void LandmarkCorrection::Correct(const std::vector<Found>& found) {
   }
   // Both sightings, the first and the present one, have the landmark noise.
   const double turn_variance = first(2, 2) + 2.0 * noise.slope_rad * noise.slope_rad / count;
-  bool plausible = turn * turn < kMaxNis * (covariance(2, 2) + turn_variance);
+  bool plausible = turn * turn < kMaxNis<1> * (covariance(2, 2) + turn_variance);
   if (plausible && turn_variance < covariance(2, 2)) {
     pose.theta = WrapAngle(pose.theta + turn);
     covariance.row(2).setZero();
@@ -95,7 +95,7 @@ void LandmarkCorrection::Correct(const std::vector<Found>& found) {
     const double measured = 2.0 * (noise.range_m * noise.range_m / corners + sideways * range2);
     const Eigen::Matrix2d shift_covariance = first.topLeftCorner<2, 2>() + measured * Eigen::Matrix2d::Identity();
     const Eigen::Matrix2d before = covariance.topLeftCorner<2, 2>();
-    plausible = Nis<2>(shift, before + shift_covariance) < kMaxNis;
+    plausible = Nis<2>(shift, before + shift_covariance) < kMaxNis<2>;
     if (plausible && shift_covariance.trace() < before.trace()) {
       pose.x += shift.x();
       pose.y += shift.y();

@@ -19,14 +19,15 @@ constexpr double kPointEveryM = 3.0;
 
 // A scanner that does not see the ends of a corridor, with few beams and few scans, which makes 400 runs
 // affordable.
-sim::FleetOptions RobotOf(std::uint64_t seed) {
+sim::FleetOptions RobotOf(const ConsistencyDrive& drive, std::uint64_t seed) {
   sim::FleetOptions robot;
   robot.robots = 1;
   robot.scan_hz = 4.0;
   robot.odometry_hz = 20.0;
   robot.laser.beams = 180;
   robot.laser.range_max_m = 10.0;
-  robot.laser.error.sigma_m = 0.02;
+  robot.laser.error.sigma_m = drive.range_sigma_m;
+  robot.laser.sweep_s = drive.sweep_s;
   robot.seed = seed;
   return robot;
 }
@@ -184,7 +185,7 @@ SeenAgain SeenAgainIn(const slam::MapperSnapshot& snapshot, const Trajectory& tr
 // The places of one drive, every kPointEveryM of the true path. What was seen again is added to `seen_again`.
 std::vector<Place> DriveOnce(const ConsistencyDrive& drive, const MapperConsistencyOptions& options, std::uint64_t seed,
                              SeenAgain& seen_again) {
-  const sim::FleetOptions robot = RobotOf(seed);
+  const sim::FleetOptions robot = RobotOf(drive, seed);
   auto fleet = sim::Fleet::Create(drive.world, robot);
   if (!fleet) throw std::invalid_argument(fleet.error().message);
   std::vector<slam::ScanOutcome> outcomes;
@@ -267,6 +268,13 @@ std::vector<ConsistencyDrive> ConsistencyDrives(double seconds) {
   for (sim::World world : {Shipped("building"), Shipped("corridor"), Hall(), EqualRooms()})
     drives.push_back({std::move(world), seconds});
   return drives;
+}
+
+ConsistencyDrive WithCheapLidar(ConsistencyDrive drive) {
+  drive.world.name += ", cheap lidar";
+  drive.range_sigma_m = 0.04;
+  drive.sweep_s = 0.2;
+  return drive;
 }
 
 ConsistencyDrive NichesDrive(double seconds) {

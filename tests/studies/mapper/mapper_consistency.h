@@ -16,14 +16,19 @@
 
 namespace cairn::studies {
 
-// A place to drive in, and for how long.
+// A place to drive in, for how long, and with which lidar.
 struct ConsistencyDrive {
   sim::World world;
   double seconds = 0.0;
+  double range_sigma_m = 0.02;  // Standard deviation of a range.
+  double sweep_s = 0.0;         // Time from the first beam of a scan to the last one.
 };
 
 // The shipped building and corridor, a hall with pillars where the laser often sees no wall, and a row of equal rooms.
 [[nodiscard]] std::vector<ConsistencyDrive> ConsistencyDrives(double seconds);
+
+// The same drive with a cheap lidar, whose ranges are twice as noisy and whose turn takes 0.2 s.
+[[nodiscard]] ConsistencyDrive WithCheapLidar(ConsistencyDrive drive);
 
 // A ring of corridors with equal niches, in which every place is seen again and looks like many others.
 [[nodiscard]] ConsistencyDrive NichesDrive(double seconds);

@@ -39,7 +39,10 @@ class Coverage {
   explicit Coverage(const RelationNoise& noise) : noise_(PoseCovariance(noise.sigma_m, noise.sigma_rad)) {}
   void Add(const Pose2& T_from_to, const Eigen::Matrix3d& covariance, const Pose2& T_from_to_true) {
     const Eigen::Vector3d error = Minus(T_from_to, T_from_to_true);
-    nees_.push_back(error.dot((covariance + noise_).ldlt().solve(error)));
+    const Eigen::Matrix3d P = covariance + noise_;
+    nees_.push_back(error.dot(P.ldlt().solve(error)));
+    position_nees_ += error.head<2>().dot(P.topLeftCorner<2, 2>().inverse() * error.head<2>());
+    heading_nees_ += error.z() * error.z() / P(2, 2);
   }
   [[nodiscard]] RelationCoverage result() {
     RelationCoverage result;
@@ -50,6 +53,8 @@ class Coverage {
       result.nees += share * nees;
       result.inside += nees <= inside ? share : 0.0;
     }
+    result.position_nees = share * position_nees_;
+    result.heading_nees = share * heading_nees_;
     std::ranges::sort(nees_);
     result.nees_median = nees_[nees_.size() / 2];
     return result;
@@ -58,6 +63,7 @@ class Coverage {
  private:
   Eigen::Matrix3d noise_;
   std::vector<double> nees_;
+  double position_nees_ = 0.0, heading_nees_ = 0.0;
 };
 
 }  // namespace
@@ -107,6 +113,34 @@ RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log, cons
     const Pose2 T_map_from = pose(*from), T_map_to = pose(*to);
     coverage.Add(Between(T_map_from, T_map_to),
                  RelativeCovariance(T_map_from, errors_of(*from), T_map_to, errors_of(*to)), relation.T_from_to);
+  }
+  return coverage.result();
+}
+
+RelationCoverage CoverageOfSteps(const LogRun& run, const StudyLog& log, const RelationNoise& noise) {
+  const slam::MapperSnapshot& snapshot = run.snapshot;
+  std::vector<const slam::PoseRelation*> steps(snapshot.keyframes.size(), nullptr);
+  for (const slam::PoseRelation& relation : snapshot.relations)
+    if (!relation.loop && relation.to == relation.from + 1) steps[relation.to] = &relation;
+  Coverage coverage(noise);
+  for (const Relation& relation : log.relations) {
+    const auto *from = AtStamp(snapshot.scans, relation.from), *to = AtStamp(snapshot.scans, relation.to);
+    if (from == nullptr || to == nullptr || from->keyframe > to->keyframe) continue;
+    Pose2 T_from_to = from->T_keyframe_robot.Inverse();
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    double way_m = 0.0;
+    for (std::size_t k = from->keyframe + 1; k <= to->keyframe && way_m <= kStepsWithinM; ++k) {
+      if (steps[k] == nullptr) way_m = 2.0 * kStepsWithinM;
+      if (steps[k] == nullptr) break;
+      const Pose2& step = steps[k]->T_from_to;
+      const Eigen::Matrix3d J_before = J_compose_left(T_from_to, step), J_step = J_compose_right(T_from_to, step);
+      covariance = J_before * covariance * J_before.transpose() + J_step * steps[k]->covariance * J_step.transpose();
+      T_from_to = T_from_to * step;
+      way_m += step.translation().norm();
+    }
+    if (way_m > kStepsWithinM) continue;
+    const Eigen::Matrix3d J = J_compose_left(T_from_to, to->T_keyframe_robot);
+    coverage.Add(T_from_to * to->T_keyframe_robot, J * covariance * J.transpose(), relation.T_from_to);
   }
   return coverage.result();
 }

@@ -24,12 +24,18 @@ struct RelationNoise {
 
 struct RelationCoverage {
   std::size_t compared = 0;
-  double inside = 0.0;       // Share of the relations in the 95 % region; 0.95 is right.
-  double nees = 0.0;         // Mean; 3 is right.
-  double nees_median = 0.0;  // 2.37 is right.
+  double inside = 0.0;         // Share of the relations in the 95 % region; 0.95 is right.
+  double nees = 0.0;           // Mean; 3 is right.
+  double nees_median = 0.0;    // 2.37 is right.
+  double position_nees = 0.0;  // 2 is right.
+  double heading_nees = 0.0;   // 1 is right.
 };
 
 [[nodiscard]] RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log, const RelationNoise& noise);
+// Of what the front-end alone says: the steps between keyframes, one after the other, without any loop. Relations whose
+// two scans are at most kStepsWithinM of way apart.
+inline constexpr double kStepsWithinM = 30.0;
+[[nodiscard]] RelationCoverage CoverageOfSteps(const LogRun& run, const StudyLog& log, const RelationNoise& noise);
 [[nodiscard]] RelationCoverage CoverageOfOnline(const LogRun& run, const StudyLog& log, const RelationNoise& noise);
 
 }  // namespace cairn::studies

@@ -40,6 +40,36 @@ struct Make {
   }
 };
 
+// All particles but one are at one place, and the doubt has been found to be small. The one far away has a path that is
+// eight times as likely as that of each other, but together they weigh twelve times as much. The pose was that one.
+TEST(ParticleSet, ThePoseIsWhereTheWeightIs) {
+  ParticleSet set({.sample_distance_m = 1e9}, kParticles, {}, 1);
+  ASSERT_TRUE(set.Commit().empty());
+  set.Predict({1.0, 0.0, 0.0}, 9.0 * Eigen::Matrix3d::Identity());
+  set.Sample(7);
+  ASSERT_GT((set[7].T_map_robot.translation() - Eigen::Vector2d(1.0, 0.0)).norm(), 1.0);
+  set.Constrain<3>(0, {Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity(), 1e-4 * Eigen::Matrix3d::Identity()});
+  set.AddLogLikelihood(7, std::log(8.0));
+  ASSERT_TRUE(set.Commit().empty());
+  EXPECT_LT((set.estimate().T_map_robot.translation() - Eigen::Vector2d(1.0, 0.0)).norm(), 1e-9);
+  EXPECT_NE(set.best_index(), 7U);
+}
+
+// Where no place has more than twice the weight of another one, the likeliest path counts, so that the pose does not
+// change between them with every resampling.
+TEST(ParticleSet, OfTwoPlacesOfAboutTheSameWeightThePoseIsThatOfTheLikeliestPath) {
+  ParticleSet set({.sample_distance_m = 1e9}, 3, {}, 1);
+  ASSERT_TRUE(set.Commit().empty());
+  set.Predict({1.0, 0.0, 0.0}, 9.0 * Eigen::Matrix3d::Identity());
+  set.Sample(2);
+  const Pose2 apart = set[2].T_map_robot;
+  ASSERT_GT((apart.translation() - Eigen::Vector2d(1.0, 0.0)).norm(), 1.0);
+  set.Constrain<3>(0, {Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity(), 1e-4 * Eigen::Matrix3d::Identity()});
+  set.AddLogLikelihood(2, 0.1);
+  ASSERT_TRUE(set.Commit().empty());
+  EXPECT_EQ(set.estimate().T_map_robot, apart);
+}
+
 template <typename Model>
 class FastSlamVariants : public testing::Test {};
 using Models = testing::Types<LandmarkPair, LandmarkOriented, LandmarkPoint>;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "server/slam/filters/filter.h"
 #include "server/slam/landmarks/innovation.h"
 
 namespace cairn::slam {
@@ -18,6 +19,13 @@ TEST(ChiSquareQuantile, UndoesTheShareAlsoForManyNumbers) {
   for (const double numbers : {1.0, 7.0, 300.0, 30000.0})
     for (const double share : {0.025, 0.5, 0.975})
       EXPECT_NEAR(ChiSquareShare(ChiSquareQuantile(share, numbers), numbers), share, 1e-6);
+}
+
+// Sixteen served for two and for three numbers.
+TEST(MaxNis, IsTheSameQuantileForAnyNumbers) {
+  const double share = ChiSquareShare(kMaxNis<3>, 3);
+  EXPECT_NEAR(kMaxNis<2>, ChiSquareQuantile(share, 2), 1e-3);
+  EXPECT_NEAR(kMaxNis<1>, ChiSquareQuantile(share, 1), 1e-3);
 }
 
 TEST(ChiSquareShare, IsNothingBelowNothing) {

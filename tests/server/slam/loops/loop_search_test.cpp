@@ -90,6 +90,7 @@ TEST(LoopSearch, FindsNothingWhereTheRobotHasNotBeen) {
 // After one round, the metres 130 to 148 of the path lie on the first side again, and the last 15 m show no
 // corner.
 constexpr double kOnTheFirstSideM = 130.0, kBeforeTheNextCornerM = 146.0;
+constexpr double kInKnownCorridorM = 126.0;
 
 TEST(LoopSearch, ABareCorridorFitsAnywhereAndIsNotBelieved) {
   for (const Ride& ride : kRides) {
@@ -134,6 +135,22 @@ TEST(LoopSearch, ClosesNoLoopAtTheWrongCornerOrTheWrongOneOfEqualRooms) {
       const auto found = DriveUntilFound(drive, rooms ? test::RingOfEqualRooms() : RingCorridor(false), 190.0, ride);
       ASSERT_TRUE(found) << "a search that finds nothing would close no wrong loop either";
       ExpectRight(drive, *found);
+    }
+  }
+}
+
+// The search begins at the end of 14 m that were seen before, and from there on everything looks different. The next
+// stretches of 15 m still show mostly those 14 m, and confirmed the first one, although all that they have in common
+// with the old place are the same scans.
+TEST(LoopSearch, TheSameScansDoNotConfirmALoop) {
+  for (const Ride& ride : kRides) {
+    SCOPED_TRACE(ride.seed);
+    const World old = RingCorridor(true, 10 + ride.seed), other = RingCorridor(true, 50 + ride.seed);
+    for (const bool the_same : {false, true}) {
+      Drive drive;
+      const auto found = DriveUntilFound(drive, old, 140.0, ride, kInKnownCorridorM, {}, the_same ? &old : &other);
+      EXPECT_EQ(found.has_value(), the_same);
+      if (found) ExpectRight(drive, *found);
     }
   }
 }
