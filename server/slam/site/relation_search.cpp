@@ -10,6 +10,7 @@
 #include "server/slam/loops/region.h"
 #include "server/slam/loops/stretch_match.h"
 #include "server/slam/loops/unique_pose.h"
+#include "server/slam/loops/unseen_along.h"
 #include "server/slam/loops/visibility.h"
 #include "server/slam/matching/point_index.h"
 
@@ -174,10 +175,9 @@ class NearbySearch {
                         *of_seen.points(seen), match.T_ref_curr, options_.self_check.near_m);
     if (counts.known() < kMinRevisitPoints || counts.contradicted > options_.loop.max_conflict * counts.known())
       return std::nullopt;
-    return SessionRelation{{known_.number, centre},
-                           {seen_.number, seen},
-                           match.T_ref_curr,
-                           match.covariance + PoseCovariance(options_.revisit.sigma_m, kRevisitSigmaRad)};
+    Eigen::Matrix3d covariance = match.covariance + PoseCovariance(options_.revisit.sigma_m, kRevisitSigmaRad);
+    if (match.degenerate) covariance.topLeftCorner<2, 2>() += UnseenAlong(match);
+    return SessionRelation{{known_.number, centre}, {seen_.number, seen}, match.T_ref_curr, covariance};
   }
 
   [[nodiscard]] std::optional<SessionRelation> MeasureStretch(std::size_t centre, std::size_t seen,
@@ -299,6 +299,10 @@ std::vector<std::size_t> PlacesToLookFor(const SessionMap& seen) {
   return places;
 }
 
+std::size_t FirstOfPlace(const SessionMap& seen, std::size_t keyframe) {
+  return StretchAround(seen.trail().shapes(), keyframe, kHalfStretchM).first;
+}
+
 std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionMap& known, std::size_t seen_number,
                                               SessionMap& seen, std::size_t keyframe, const LoopOptions& options,
                                               RelationBook& book) {
@@ -331,7 +335,7 @@ std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionM
 
 std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, const PlacedSession& seen,
                                                  std::span<const Tie> ties, const SiteOptions& options,
-                                                 const GoOn& go_on, RelationBook& book) {
+                                                 const GoOn& go_on, RelationBook& book, NearbySearchKind kind) {
   Asking goes_on(go_on);
   NearbySearch search(known, seen, ties, options, book);
   std::vector<SessionRelation> found;
@@ -344,6 +348,7 @@ std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, con
     found.push_back(*std::move(revisit));
     revisited_m.push_back(seen.map.travelled_m(k));
   }
+  if (kind == NearbySearchKind::kRevisits) return found;
 
   std::vector<SessionRelation> stretches;
   double next_m = 0.0;
