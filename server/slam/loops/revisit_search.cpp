@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "server/slam/loops/unseen_along.h"
-
 namespace cairn::slam {
 namespace {
 
@@ -17,6 +15,7 @@ constexpr double kGuessSigmaRad = 0.15;      // Standard deviation of its headin
 constexpr double kMinRevisitScore = 0.6;     // Share of the points of the scan that must be explained.
 constexpr double kRevisitSigmaRad = 0.02;    // Standard deviation that is added to the heading of a match.
 constexpr double kAlikeM = 2.0;              // Way on which matches have the same errors.
+constexpr double kOpenSigmaM = 100.0;        // Standard deviation of a position that the scan does not show at all.
 
 // The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
 std::optional<std::size_t> NearestKeyframe(const Pose2& T_map_robot, const PathIndex& index, const Trail& trail,
@@ -41,6 +40,13 @@ std::optional<std::size_t> NearestKeyframe(const Pose2& T_map_robot, const PathI
   const auto go_on = [&best](double distance_m) { return distance_m <= best; };
   index.ForEachFrom(here, options.max_distance_m, go_on, look);
   return nearest;
+}
+
+// Along a corridor the match stays where the guess was, which is a particle's own belief: it must not count once more
+// as something that was measured.
+Eigen::Matrix2d UnseenAlong(const MatchResult& match) {
+  const double variance = 1.0 / std::max(match.open_information, 1.0 / (kOpenSigmaM * kOpenSigmaM));
+  return variance * match.degenerate_direction * match.degenerate_direction.transpose();
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include "server/slam/loops/region.h"
 #include "server/slam/loops/stretch_match.h"
 #include "server/slam/loops/unique_pose.h"
-#include "server/slam/loops/unseen_along.h"
 #include "server/slam/loops/visibility.h"
 #include "server/slam/matching/point_index.h"
 
@@ -175,9 +174,10 @@ class NearbySearch {
                         *of_seen.points(seen), match.T_ref_curr, options_.self_check.near_m);
     if (counts.known() < kMinRevisitPoints || counts.contradicted > options_.loop.max_conflict * counts.known())
       return std::nullopt;
-    Eigen::Matrix3d covariance = match.covariance + PoseCovariance(options_.revisit.sigma_m, kRevisitSigmaRad);
-    if (match.degenerate) covariance.topLeftCorner<2, 2>() += UnseenAlong(match);
-    return SessionRelation{{known_.number, centre}, {seen_.number, seen}, match.T_ref_curr, covariance};
+    return SessionRelation{{known_.number, centre},
+                           {seen_.number, seen},
+                           match.T_ref_curr,
+                           match.covariance + PoseCovariance(options_.revisit.sigma_m, kRevisitSigmaRad)};
   }
 
   [[nodiscard]] std::optional<SessionRelation> MeasureStretch(std::size_t centre, std::size_t seen,

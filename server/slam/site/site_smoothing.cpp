@@ -156,8 +156,7 @@ class Smoothing {
   bool JoinByPlaces() {
     std::vector<Pair> left = Pairs();
     // A robot that is joined is to be told so at once; the pairs that it makes worth a search wait for the next job.
-    if (search_ != SiteSearch::kAll)
-      std::erase_if(left, [this](const Pair& pair) { return !IsToBeSearched(pair); });
+    if (search_ != SiteSearch::kAll) std::erase_if(left, [this](const Pair& pair) { return !IsToBeSearched(pair); });
     const std::size_t all = left.size();
     // A fragment that is joined makes pairs of others worth a search that were not before.
     for (auto next = left.begin(); next != left.end();) {
@@ -192,8 +191,11 @@ class Smoothing {
     const SiteGraph before = graph_;
     if (!Try(a, b, places)) return false;
     if (search_ != SiteSearch::kAll) {  // A robot that waits to be joined drives on meanwhile.
+      // The places stay: revisits in a corridor do not show where along it the robot is.
+      std::vector<SessionRelation> both = places;
       const auto revisits = SearchNearby(a, b, TiesOf(a, b), NearbySearchKind::kRevisits);
-      if (!go_on_(done_) || !Try(a, b, revisits)) return false;
+      both.insert(both.end(), revisits.begin(), revisits.end());
+      if (!go_on_(done_) || !Try(a, b, both)) return false;
       if (IsTrusted(a, b)) return true;
       TakeBack(before);
       if (!Try(a, b, places)) return false;
