@@ -14,6 +14,7 @@ constexpr double kSameAgreement = 0.005;   // Shares that differ by less are the
 // The mean square of how far scans are off the maps of others has to fall to this share of it, because a new map
 // version moves every robot that drives.
 constexpr double kBetter = 0.9;
+constexpr double kAlignAgainAfter = 2.0;  // Ratio of keyframes, while a robot waits for being joined.
 
 using PathOf = std::function<const std::vector<Pose2>&(std::size_t session)>;
 
@@ -77,6 +78,29 @@ std::optional<Alignment> AlignmentOf(const std::vector<SessionMaterial>& materia
   alignment.before_m2 = *before;
   alignment.after_m2 = *after;
   return alignment;
+}
+
+bool AlignmentPace::IsDue(const std::string& site, const std::vector<SessionMaterial>& material) {
+  Known now;
+  bool waits = false;
+  for (const SessionMaterial& session : material) {
+    if (session.start_known) {
+      now.made += session.snapshot.made();
+      ++now.sessions;
+    }
+    waits = waits || (!session.start_known && session.joinable && !session.snapshot.keyframes.empty());
+  }
+  Known& before = sites_.try_emplace(site).first->second;
+  const bool joined = now.sessions > before.sessions;
+  const bool more =
+      now.made < before.made || static_cast<double>(now.made) >= kAlignAgainAfter * static_cast<double>(before.made);
+  const bool due = !waits || (!joined && more);
+  if (due || joined) before = now;
+  return due;
+}
+
+void AlignmentPace::KeepOnly(const std::function<bool(const std::string&)>& exists) {
+  std::erase_if(sites_, [&exists](const auto& one) { return !exists(one.first); });
 }
 
 }  // namespace cairn::server

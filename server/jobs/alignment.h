@@ -4,8 +4,12 @@
 // deterministic.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/robots/robot_event.h"
@@ -31,5 +35,24 @@ struct Alignment {
 [[nodiscard]] std::optional<Alignment> AlignmentOf(const std::vector<SessionMaterial>& material,
                                                    const std::vector<slam::SmoothedSession>& joint,
                                                    const std::function<bool()>& go_on);
+
+// When the next job of a site is to align. To align takes long, and no job looks for the place of another robot
+// meanwhile. So while a robot waits for being joined, a job aligns only when the robots whose places are known have
+// twice as many keyframes as when they were aligned last, or when the last one of them was joined. Not thread-safe.
+class AlignmentPace {
+ public:
+  // Asked by every job that may align; where it says so, the job does.
+  [[nodiscard]] bool IsDue(const std::string& site, const std::vector<SessionMaterial>& material);
+  // Forgets all other sites.
+  void KeepOnly(const std::function<bool(const std::string&)>& exists);
+
+ private:
+  // The sessions whose places were known then, and the keyframes that they had made.
+  struct Known {
+    std::size_t sessions = 0;
+    std::uint64_t made = 0;
+  };
+  std::map<std::string, Known> sites_;
+};
 
 }  // namespace cairn::server

@@ -36,8 +36,7 @@ class Decision {
   std::atomic<bool> taken_ = false;
 };
 
-constexpr double kShareOfJoining = 0.5;    // Of the progress.
-constexpr double kAlignAgainAfter = 1.25;  // SmoothJob::IsDueToAlign.
+constexpr double kShareOfJoining = 0.5;  // Of the progress.
 
 // Nothing: cancelled.
 std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vector<SessionMaterial>& material,
@@ -201,29 +200,14 @@ bool SmoothJob::MayAlign(const Job& job) const {
                               [&job](const Job& other) { return other.id != job.id && !IsFinal(other.state); });
 }
 
-bool SmoothJob::IsDueToAlign(const std::string& site, const std::vector<SessionMaterial>& material) {
-  std::erase_if(aligned_, [this](const auto& one) { return atlas_.Find(one.first) == nullptr; });
-  std::uint64_t made = 0;
-  bool waits = false;
-  for (const SessionMaterial& session : material) {
-    if (session.start_known) made += session.snapshot.made();
-    waits = waits || (!session.start_known && session.joinable && !session.snapshot.keyframes.empty());
-  }
-  const auto last = aligned_.find(site);
-  if (waits && last != aligned_.end() && made >= last->second &&
-      static_cast<double>(made) < kAlignAgainAfter * static_cast<double>(last->second))
-    return false;
-  aligned_[site] = made;
-  return true;
-}
-
 Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<SessionMaterial>& material,
                                        const JobControl& control) {
   std::vector<std::uint64_t> sessions;
   sessions.reserve(material.size());
   for (const SessionMaterial& one : material) sessions.push_back(one.session);
   slam::RelationBook& book = books_.Open(job.site, sessions);
-  const bool align = MayAlign(job) && IsDueToAlign(job.site, material);
+  aligned_.KeepOnly([this](const std::string& site) { return atlas_.Find(site) != nullptr; });
+  const bool align = MayAlign(job) && aligned_.IsDue(job.site, material);
   auto smoothed =
       SmoothSite(job, material, options_.joint ? &site_ : nullptr, control, &book, align, &drawings_.Open(job.site));
   // Also where the job was cancelled: what it has measured and drawn holds.

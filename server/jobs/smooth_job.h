@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "server/jobs/alignment.h"
 #include "server/jobs/job_control.h"
 #include "server/jobs/job_list.h"
 #include "server/jobs/jobs_options.h"
@@ -65,9 +66,6 @@ class SmoothJob {
  private:
   // Whether the job may make a version that nobody has asked for.
   [[nodiscard]] bool MayAlign(const Job& job) const;
-  // While a robot waits for being joined, one job aligns only when the others have a quarter more keyframes than at the
-  // last one: to align takes long, and no job looks for a place of that robot meanwhile.
-  [[nodiscard]] bool IsDueToAlign(const std::string& site, const std::vector<SessionMaterial>& material);
   Result<SmoothedSite> Smooth(const Job& job, const std::vector<SessionMaterial>& material, const JobControl& control);
   Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
 
@@ -78,8 +76,7 @@ class SmoothJob {
   const JobList* const jobs_;
   RelationBooks books_;
   KeptDrawings drawings_;
-  // By site: how many keyframes the robots whose places are known had made when a job aligned them last.
-  std::map<std::string, std::uint64_t> aligned_;
+  AlignmentPace aligned_;
 };
 
 }  // namespace cairn::server

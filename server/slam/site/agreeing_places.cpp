@@ -4,50 +4,80 @@
 #include <array>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "server/slam/site/consistent_set.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr std::size_t kMinPlaces = 3;     // Recognised places that must agree before sessions are joined, ...
-constexpr double kMinSpreadM = 15.0;      // ... and the way along which they must lie, in both sessions.
-constexpr std::size_t kEnoughPlaces = 5;  // With so many the search ends.
+constexpr std::size_t kMinPlaces = 3;  // Recognised places that must agree before sessions are joined, ...
+// ... and the way that they must cover together, in both sessions. The first and the last place may each reach 4.5 m
+// beyond what both have seen, because most of a place must be explained, but not all of it. So 15 m are shared.
+constexpr double kMinCoveredM = 24.0;
+constexpr std::size_t kEnoughPlaces = 5;                   // With so many the search ends.
 constexpr std::array<std::size_t, 4> kPasses{0, 2, 1, 3};  // Each looks at every fourth place, from this one on.
 // A search that will soon be made again ends where so many passes have found no place.
 constexpr std::size_t kFirstPasses = 2;
+
+struct WayRange {
+  double low_m = std::numeric_limits<double>::infinity();
+  double high_m = -std::numeric_limits<double>::infinity();
+
+  void Add(double way_m) {
+    low_m = std::min(low_m, way_m);
+    high_m = std::max(high_m, way_m);
+  }
+  void Add(const WayRange& other) {
+    Add(other.low_m);
+    Add(other.high_m);
+  }
+};
+
+// A stretch of one session that was recognised in the other: from `a` to `b`, and from where to where it goes along
+// both.
+struct Recognised {
+  SessionRelation relation;
+  WayRange in_a, in_b;
+};
 
 SessionRelation Reversed(const SessionRelation& one) {
   const Eigen::Matrix3d J = J_inverse(one.T_from_to);
   return {one.to, one.from, one.T_from_to.Inverse(), J * one.covariance * J.transpose()};
 }
 
-std::vector<SessionRelation> LargestAgreeing(const std::vector<SessionRelation>& all, const SessionMap& from,
-                                             const SessionMap& to, const LoopOptions& options) {
+// A place of `seen` that begins at keyframe `first` and was recognised in `known`.
+Recognised InBoth(const SessionRelation& place, const SessionMap& known, const SessionMap& seen, std::size_t first) {
+  Recognised both{.relation = place, .in_a = {}, .in_b = {}};
+  both.in_b.Add(seen.travelled_m(first));
+  both.in_b.Add(seen.travelled_m(place.to.keyframe));
+  const Pose2 T_known_first = known.own_path()[place.from.keyframe] * place.T_from_to *
+                              Between(seen.own_path()[place.to.keyframe], seen.own_path()[first]);
+  both.in_a.Add(known.travelled_m(place.from.keyframe));
+  both.in_a.Add(known.travelled_m(known.NearestTo(T_known_first)));
+  return both;
+}
+
+std::vector<Recognised> LargestAgreeing(const std::vector<Recognised>& all, const SessionMap& a, const SessionMap& b,
+                                        const LoopOptions& options) {
   const auto set = LargestConsistentSet(all.size(), [&](std::size_t i, std::size_t j) {
-    return Disagreement2(all[i], all[j], from, to, options) <= kMaxChiSquare;
+    return Disagreement2(all[i].relation, all[j].relation, a, b, options) <= kMaxChiSquare;
   });
-  std::vector<SessionRelation> agreeing;
+  std::vector<Recognised> agreeing;
   agreeing.reserve(set.size());
   for (const std::size_t i : set) agreeing.push_back(all[i]);
   return agreeing;
 }
 
-// So many places, spread over some way in both sessions.
-bool IsProof(const std::vector<SessionRelation>& places, const SessionMap& from, const SessionMap& to,
-             std::size_t least) {
+// So many places, which cover enough way in both sessions: places next to each other show nearly the same.
+bool IsProof(const std::vector<Recognised>& places, std::size_t least) {
   if (places.size() < least) return false;
-  const auto spread = [&](const SessionMap& map, auto keyframe_of) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const SessionRelation& one : places) {
-      const double here = map.travelled_m(keyframe_of(one).keyframe);
-      low = std::min(low, here);
-      high = std::max(high, here);
-    }
-    return high - low;
-  };
-  return spread(from, [](const auto& one) { return one.from; }) >= kMinSpreadM &&
-         spread(to, [](const auto& one) { return one.to; }) >= kMinSpreadM;
+  WayRange in_a, in_b;
+  for (const Recognised& one : places) {
+    in_a.Add(one.in_a);
+    in_b.Add(one.in_b);
+  }
+  return in_a.high_m - in_a.low_m >= kMinCoveredM && in_b.high_m - in_b.low_m >= kMinCoveredM;
 }
 
 }  // namespace
@@ -55,26 +85,40 @@ bool IsProof(const std::vector<SessionRelation>& places, const SessionMap& from,
 std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, std::size_t b, SessionMap& map_b,
                                             const LoopOptions& options, bool soon_again, const GoOn& go_on,
                                             RelationBook& book) {
-  const std::vector<std::size_t> of_a = PlacesToLookFor(map_a), of_b = PlacesToLookFor(map_b);
-  std::vector<SessionRelation> all;
-  std::vector<SessionRelation> agreeing;
-  const auto add = [&](const SessionRelation& place) {
-    all.push_back(place);
+  std::vector<std::size_t> of_a = PlacesToLookFor(map_a), of_b = PlacesToLookFor(map_b);
+  if (soon_again) {  // What was driven since the last search has not been looked for yet.
+    std::ranges::reverse(of_a);
+    std::ranges::reverse(of_b);
+  }
+  std::vector<Recognised> all;
+  std::vector<Recognised> agreeing;
+  const auto add = [&](Recognised place) {
+    all.push_back(std::move(place));
     agreeing = LargestAgreeing(all, map_a, map_b, options);
+  };
+  const auto relations = [&agreeing] {
+    std::vector<SessionRelation> relations_of_all;
+    for (const Recognised& one : agreeing) relations_of_all.push_back(one.relation);
+    return relations_of_all;
   };
   for (std::size_t pass = 0; pass < kPasses.size(); ++pass) {
     if (soon_again && pass == kFirstPasses && all.empty()) return {};
     for (std::size_t i = kPasses[pass]; i < std::max(of_a.size(), of_b.size()); i += kPasses.size()) {
-      if (IsProof(agreeing, map_a, map_b, kEnoughPlaces)) return agreeing;
+      if (IsProof(agreeing, kEnoughPlaces)) return relations();
       if (!go_on()) return {};
       if (i < of_b.size())
-        if (const auto place = RecognisePlace(a, map_a, b, map_b, of_b[i], options, book)) add(*place);
+        if (const auto place = RecognisePlace(a, map_a, b, map_b, of_b[i], options, book))
+          add(InBoth(*place, map_a, map_b, FirstOfPlace(map_b, of_b[i])));
       if (i >= of_a.size() || !go_on()) continue;
-      if (const auto place = RecognisePlace(b, map_b, a, map_a, of_a[i], options, book)) add(Reversed(*place));
+      if (const auto place = RecognisePlace(b, map_b, a, map_a, of_a[i], options, book)) {
+        Recognised both = InBoth(*place, map_b, map_a, FirstOfPlace(map_a, of_a[i]));
+        std::swap(both.in_a, both.in_b);
+        both.relation = Reversed(*place);
+        add(std::move(both));
+      }
     }
   }
-  if (!IsProof(agreeing, map_a, map_b, kMinPlaces)) agreeing.clear();
-  return agreeing;
+  return IsProof(agreeing, kMinPlaces) ? relations() : std::vector<SessionRelation>{};
 }
 
 }  // namespace cairn::slam

@@ -10,9 +10,9 @@
 namespace cairn::slam {
 
 // Relations from `a` to `b`: of the places of each that are recognised in the other the largest set that agrees, if
-// these are enough, and spread over enough way in both sessions; else none. The search ends with the first proof; it
-// looks at places far apart first. `soon_again`: it ends where half of the places have shown nothing, because it will
-// be made again. If `go_on` returns false, the result must not be used.
+// these are enough, and cover enough way in both sessions; else none. The search ends with the first proof; it looks at
+// places far apart first. `soon_again`: it begins with the newest places, and ends where half of the places have shown
+// nothing, because it will be made again. If `go_on` returns false, the result must not be used.
 [[nodiscard]] std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, std::size_t b,
                                                           SessionMap& map_b, const LoopOptions& options,
                                                           bool soon_again, const GoOn& go_on, RelationBook& book);

@@ -301,6 +301,10 @@ std::vector<std::size_t> PlacesToLookFor(const SessionMap& seen) {
   return places;
 }
 
+std::size_t FirstOfPlace(const SessionMap& seen, std::size_t keyframe) {
+  return StretchAround(seen.trail().shapes(), keyframe, kHalfStretchM).first;
+}
+
 std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionMap& known, std::size_t seen_number,
                                               SessionMap& seen, std::size_t keyframe, const LoopOptions& options,
                                               RelationBook& book) {
@@ -333,7 +337,7 @@ std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionM
 
 std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, const PlacedSession& seen,
                                                  std::span<const Tie> ties, const SiteOptions& options,
-                                                 const GoOn& go_on, RelationBook& book) {
+                                                 const GoOn& go_on, RelationBook& book, NearbySearchKind kind) {
   Asking goes_on(go_on);
   NearbySearch search(known, seen, ties, options, book);
   std::vector<SessionRelation> found;
@@ -346,6 +350,7 @@ std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, con
     found.push_back(*std::move(revisit));
     revisited_m.push_back(seen.map.travelled_m(k));
   }
+  if (kind == NearbySearchKind::kRevisits) return found;
 
   std::vector<SessionRelation> stretches;
   double next_m = 0.0;

@@ -12,6 +12,7 @@
 // was found so far is returned and must not be used.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -35,7 +36,10 @@ struct PlacedSession {
 
 // Keyframes of a session in the middle of the stretches that are looked for in others, some metres of way apart.
 [[nodiscard]] std::vector<std::size_t> PlacesToLookFor(const SessionMap& seen);
-// The place around a keyframe of `seen` in the map of `known`: a relation from `known` to `seen`.
+// The first keyframe of what is looked for as the place around this one.
+[[nodiscard]] std::size_t FirstOfPlace(const SessionMap& seen, std::size_t keyframe);
+// The place around a keyframe of `seen` in the map of `known`: a relation from `known` to the last keyframe of the
+// place.
 [[nodiscard]] std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionMap& known,
                                                             std::size_t seen_number, SessionMap& seen,
                                                             std::size_t keyframe, const LoopOptions& options,
@@ -48,9 +52,12 @@ struct Tie {
   std::size_t seen = 0;
 };
 
-// Revisits and stretches near the believed paths: relations from `known` to `seen`. `ties` must not be empty.
-[[nodiscard]] std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, const PlacedSession& seen,
-                                                               std::span<const Tie> ties, const SiteOptions& options,
-                                                               const GoOn& go_on, RelationBook& book);
+enum class NearbySearchKind : std::uint8_t { kRevisitsAndStretches = 0, kRevisits };
+
+// Revisits and stretches near the believed paths: relations from `known` to `seen`. `ties` must not be empty. Stretches
+// take most of the time.
+[[nodiscard]] std::vector<SessionRelation> FindRelationsNearby(
+    const PlacedSession& known, const PlacedSession& seen, std::span<const Tie> ties, const SiteOptions& options,
+    const GoOn& go_on, RelationBook& book, NearbySearchKind kind = NearbySearchKind::kRevisitsAndStretches);
 
 }  // namespace cairn::slam

@@ -42,5 +42,28 @@ TEST(Alignment, RobotsWithKnownStartsAreFittedToEachOtherOnlyWhereThatIsBetter) 
   EXPECT_LT(book.measured(), measured / 10);
 }
 
+SessionMaterial WithKeyframes(bool start_known, std::size_t keyframes) {
+  SessionMaterial material{.session = 1, .robot = "r", .snapshot = {}, .grid_options = {}, .start_known = start_known};
+  material.snapshot.keyframes.resize(keyframes);
+  return material;
+}
+
+TEST(AlignmentPace, ARobotThatWaitsToBeJoinedComesFirst) {
+  AlignmentPace pace;
+  const auto due = [&pace](std::size_t known, std::size_t keyframes, bool waits) {
+    std::vector<SessionMaterial> material(known, WithKeyframes(true, keyframes));
+    if (waits) material.push_back(WithKeyframes(false, 5));
+    return pace.IsDue("lab", material);
+  };
+  EXPECT_FALSE(due(1, 10, true));
+  EXPECT_FALSE(due(3, 20, true)) << "two were joined by the last job";
+  EXPECT_FALSE(due(3, 39, true));
+  EXPECT_TRUE(due(3, 40, true)) << "twice as many as when the last one was joined";
+  EXPECT_FALSE(due(3, 41, true));
+  EXPECT_TRUE(due(3, 42, false)) << "nobody waits";
+  pace.KeepOnly([](const std::string&) { return false; });
+  EXPECT_FALSE(due(3, 43, true)) << "another site of this name";
+}
+
 }  // namespace
 }  // namespace cairn::server

@@ -12,6 +12,7 @@
 #include "common/sensor/trajectory.h"
 #include "tests/must.h"
 #include "tests/studies/fleet/live_server.h"
+#include "tests/studies/joining/shared_way.h"
 #include "tests/studies/study.h"
 #include "tests/temp_directory.h"
 
@@ -182,28 +183,45 @@ void RunFleet(StudyContext& context, bool see_each_other) {
   const std::vector<Trajectory> paths = PathsOf(server, robots, true);
   const Errors after = ErrorsOf(paths, robots);
 
-  Table table({"robot", "way driven (m)", "way until joined (m)", "online after that, mean (m)", "smoothed, mean (m)",
+  std::vector<Trajectory> truths;
+  for (const Robot& robot : robots) truths.push_back(robot.truth);
+  const std::vector<SharedWay> shared = SharedWays(truths);
+  Table table({"robot", "way driven (m)", "until it meets the map (m)", "until it shares 15 m of it (m)",
+               "way until joined (m)", "later than shared (m)", "online after that, mean (m)", "smoothed, mean (m)",
                "smoothed, max (m)"});
   Plot plot{.title = "eight robots, starts unknown, " + part, .x = {"x", "m"}, .y = {"y", "m"}};
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const Robot& robot = robots[i];
     const double way_m = robot.joined ? WayUntil(robot.truth, *robot.joined) : -1.0;
     table.Add({robot.name, Number(WayUntil(robot.truth, robot.truth.back().stamp), 1),
+               i == 0 ? "-" : Number(shared[i].meets_m, 1), i == 0 ? "-" : Number(shared[i].shares_m, 1),
                i == 0         ? "the first"
                : robot.joined ? Number(way_m, 1)
                               : "never",
-               Number(live.mean_m[i], 3), Number(after.mean_m[i], 3), Number(after.max_m[i], 3)});
+               i == 0 || !robot.joined ? "-" : Number(way_m - shared[i].shares_m, 1), Number(live.mean_m[i], 3),
+               Number(after.mean_m[i], 3), Number(after.max_m[i], 3)});
     plot.series.push_back(PathSeries(paths[i], robot.name));
     if (context.quick) continue;
     report.Expect(robot.joined.has_value() && way_m <= kMostWayM, robot.name + " was not joined within 60 m");
   }
+  report.Text(
+      "Before a robot shares some way with robots of the map nothing can join it: `meets the map` is where it comes "
+      "within 2 m of where one of them has been, as the truth has it, and `shares 15 m` where such places lie 15 m "
+      "apart along the ways of both. A robot counts as one of the map as soon as it shares as much itself.");
   report.Add(table, "robots-" + part);
+  Table found({"job", "begun after (s)", "took (s)", "result"});
+  const Stamp first = robots.front().truth.front().stamp;
+  for (const Job& job : jobs)
+    found.Add({std::to_string(job.id), Number(SecondsFromStamp(job.started - first), 1), Number(SecondsOf(job), 1),
+               job.message.substr(0, job.message.find(';'))});
+  report.Add(found, "jobs-" + part);
   const double pause_ms = sim.at("pose_latency_max_ms");
   Table figures({"figure", "measured", "wanted"});
   figures.Add({"mean error of all smoothed paths (m)", Number(after.all_mean_m, 3), Number(kMostErrorM, 2)});
   figures.Add({"longest time from scan to pose (ms)", Number(pause_ms, 1), Number(kMostPauseMs, 0)});
   figures.Add({"scan to pose, p99 (ms)", Number(sim.at("pose_latency_p99_ms"), 1), "-"});
-  figures.Add({"jobs that looked for joins", Count(static_cast<long long>(jobs.size())), "-"});
+  figures.Add({"jobs that joined or aligned robots, and the last that did not",
+               Count(static_cast<long long>(jobs.size())), "-"});
   figures.Add({"their time, the longest and all (s)", Number(longest_s, 1) + ", " + Number(all_s, 1), "-"});
   figures.Add({"the smoothing job (s)", Number(SecondsOf(smooth), 1), "-"});
   figures.Add({"server, share of a core", Percent(sim.at("watched_cpu_share")), "-"});

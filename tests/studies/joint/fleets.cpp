@@ -84,28 +84,13 @@ struct Distance {
   [[nodiscard]] bool IsWrong() const { return mean_m() > kWrongM || mean_rad() > kWrongRad; }
 };
 
-}  // namespace
-
-FleetJoin JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& options, std::uint64_t seed) {
-  sim::FleetOptions robots;
-  robots.robots = kRobots;
-  robots.scan_hz = 4.0;
-  robots.odometry_hz = 20.0;
-  robots.laser.beams = 180;
-  robots.laser.range_max_m = 10.0;
-  robots.laser.error.sigma_m = 0.02;
-  robots.seed = seed;
-  auto fleet = sim::Fleet::Create(drive.world, robots);
-  if (!fleet) throw std::invalid_argument(fleet.error().message);
-  const auto snapshots = Drive(*fleet, drive.seconds, robots.first_stamp, options);
-
+FleetJoin Join(const std::vector<slam::MapperSnapshot>& snapshots, const std::vector<std::vector<Pose2>>& truths,
+               const slam::MapperOptions& options, slam::SiteSearch search) {
   std::vector<slam::SiteSession> sessions;
-  std::vector<std::vector<Pose2>> truths;
-  for (int i = 0; i < kRobots; ++i) {
-    sessions.push_back({snapshots[static_cast<std::size_t>(i)], false});
-    truths.push_back(TruthAt(snapshots[static_cast<std::size_t>(i)], fleet->truth(i)));
-  }
-  const auto smoothed = slam::SmoothSessions(sessions, SiteOptionsOf(options), [](double /*share*/) { return true; });
+  for (const slam::MapperSnapshot& snapshot : snapshots)
+    sessions.push_back({snapshot, search == slam::SiteSearch::kFragments && sessions.empty()});
+  const auto smoothed = slam::SmoothSessions(
+      sessions, SiteOptionsOf(options), [](double /*share*/) { return true; }, search);
   FleetJoin result{.robots = kRobots};
   double sum_m = 0.0;
   for (std::size_t i = 0; i < smoothed->size(); ++i) {
@@ -123,6 +108,27 @@ FleetJoin JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& op
   }
   result.error_m = sum_m / std::max(1, result.joined - result.wrong);
   return result;
+}
+
+}  // namespace
+
+FleetJoins JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& options, std::uint64_t seed) {
+  sim::FleetOptions robots;
+  robots.robots = kRobots;
+  robots.scan_hz = 4.0;
+  robots.odometry_hz = 20.0;
+  robots.laser.beams = 180;
+  robots.laser.range_max_m = 10.0;
+  robots.laser.error.sigma_m = 0.02;
+  robots.seed = seed;
+  auto fleet = sim::Fleet::Create(drive.world, robots);
+  if (!fleet) throw std::invalid_argument(fleet.error().message);
+  const auto snapshots = Drive(*fleet, drive.seconds, robots.first_stamp, options);
+
+  std::vector<std::vector<Pose2>> truths;
+  for (int i = 0; i < kRobots; ++i) truths.push_back(TruthAt(snapshots[static_cast<std::size_t>(i)], fleet->truth(i)));
+  return {.together = Join(snapshots, truths, options, slam::SiteSearch::kAll),
+          .fragments = Join(snapshots, truths, options, slam::SiteSearch::kFragments)};
 }
 
 }  // namespace cairn::studies

@@ -17,8 +17,13 @@ struct FleetJoin {
   double most_m = 0.0, most_rad = 0.0;  // Of the joined robot that is farthest from its place, and most turned.
 };
 
+struct FleetJoins {
+  FleetJoin together;   // All are smoothed together.
+  FleetJoin fragments;  // The first one begins the map, and a join job looks for the others in it.
+};
+
 // Three robots drive through a world.
-[[nodiscard]] FleetJoin JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& options,
-                                  std::uint64_t seed);
+[[nodiscard]] FleetJoins JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& options,
+                                   std::uint64_t seed);
 
 }  // namespace cairn::studies

@@ -150,6 +150,16 @@ TEST_F(TwoRobots, WhatAJobHasMeasuredTheNextOneKnows) {
   EXPECT_LE(book.measured(), 2U) << "nothing is new";
 }
 
+// A job that only looks for the places of robots leaves the rest to the next one.
+TEST_F(TwoRobots, AFragmentIsJoinedByWhatIsNeeded) {
+  const std::vector<SiteSession> sessions{{First().snapshot, true}, {Second().snapshot, false}};
+  const auto smoothed = *SmoothSessions(
+      sessions, SiteOptionsOf(MapperOptions{}), [](double) { return true; }, SiteSearch::kFragments);
+  ASSERT_TRUE(smoothed[0].joined && smoothed[1].joined);
+  EXPECT_GT(smoothed[1].agreement, 0.95);
+  EXPECT_LT(ErrorBetween(First(), smoothed[0].path, Second(), smoothed[1].path), 0.6);
+}
+
 // A cancelled job has not worked in vain.
 TEST_F(TwoRobots, WhatACancelledJobHasMeasuredIsKept) {
   RelationBook book;
@@ -187,6 +197,15 @@ TEST(ShortOverlap, IsNoProof) {
                    second = DriveRing(world, 24.0, 40.0, {3.0, 3.0, 2.0}, 2);
   for (const SmoothedSession& session : Smooth({{first.snapshot, false}, {second.snapshot, false}}))
     EXPECT_FALSE(session.joined);
+}
+
+// What places cover counts, not how far apart they end: they overlap.
+TEST(Overlap, JustLongEnoughIsProof) {
+  const test::World world = RingCorridor(true);
+  const RobotDrive first = DriveRing(world, 0.0, 50.0, {}, 1),
+                   second = DriveRing(world, 24.0, 40.0, {3.0, 3.0, 2.0}, 2);
+  for (const SmoothedSession& session : Smooth({{first.snapshot, false}, {second.snapshot, false}}))
+    EXPECT_TRUE(session.joined);
 }
 
 // Every place of a side looks like the place 4 m further on. Who has seen some of them can not know which.
