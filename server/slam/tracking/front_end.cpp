@@ -53,9 +53,9 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
   if (history_.empty()) {
     standstill_.Begin(step.T_track_robot, T_odom_robot);
   } else {
-    MatchResult match = Follow(view, T_odom_robot, parallel_for);
-    if (options_.use_odometry) standstill_.Hold(T_odom_robot, match);
+    const MatchResult match = Follow(view, T_odom_robot, parallel_for);
     step = StepOf(match, T_odom_robot);
+    if (options_.use_odometry) step.T_track_held = standstill_.Take(T_odom_robot, match);
   }
   score_ = step.score;
   if (options_.use_odometry && !history_.empty()) {
@@ -121,7 +121,8 @@ std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2&
   Begin(watch_, ScanStep::kRefine);
   const MatchResult match = Align(view, step.T_track_robot, guess);
   const bool better = match.converged && match.score > step.score;
-  const TrackStep again = better ? StepOf(match, T_odom_robot) : step;
+  TrackStep again = better ? StepOf(match, T_odom_robot) : step;
+  again.T_track_held = step.T_track_held;
   score_ = again.score;
   history_.push_back({again.T_track_robot, first.T_odom_robot});
   if (!better) return std::nullopt;

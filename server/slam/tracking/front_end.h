@@ -83,8 +83,10 @@ struct TrackStep {
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
   Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
+  // Where a robot that stands is told to be, in `track` (standstill.h). Nothing if it moves.
+  std::optional<Pose2> T_track_held{};
 
-  // Steps are stored only after BlindMotion has used what is not in this list.
+  // Steps are stored only after BlindMotion has used what is not in this list, and the pose has been told.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,

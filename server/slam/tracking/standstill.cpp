@@ -39,11 +39,11 @@ void Standstill::Begin(const Pose2& T_track_robot, const Pose2& T_odom_robot) {
   begin_ = mean_ = T_track_robot;
 }
 
-void Standstill::Hold(const Pose2& T_odom_robot, MatchResult& match) {
+std::optional<Pose2> Standstill::Take(const Pose2& T_odom_robot, const MatchResult& match) {
   const Pose2 moved = Between(T_odom_begin_, T_odom_robot);
   const bool stands = matches_ > 0.0 && moved.translation().norm() < kStandsM && std::abs(moved.theta) < kStandsRad;
   const bool known = match.converged && !match.shown_covariance.isZero(0.0);
-  if (stands && !match.converged) return;  // The prediction is the pose of the robot that stands.
+  if (stands && !match.converged) return at_start_ ? begin_ : mean_;  // The scan says nothing.
   Eigen::Matrix3d noise = match.shown_covariance;
   noise.diagonal() += Eigen::Vector3d(kLeastM * kLeastM, kLeastM * kLeastM, kLeastRad * kLeastRad);
   if (!stands || !known || HasMoved(Minus(match.T_ref_curr, mean_), noise)) {
@@ -52,11 +52,11 @@ void Standstill::Hold(const Pose2& T_odom_robot, MatchResult& match) {
     T_odom_begin_ = T_odom_robot;
     mean_ = match.T_ref_curr;
     matches_ = known ? 1.0 : 0.0;
-    return;
+    return std::nullopt;
   }
   matches_ = std::min(matches_ + 1.0, kMostMatches);
   mean_ = Plus(mean_, Minus(match.T_ref_curr, mean_) / matches_);
-  match.T_ref_curr = at_start_ ? begin_ : mean_;
+  return at_start_ ? begin_ : mean_;
 }
 
 bool Standstill::HasMoved(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& noise) {

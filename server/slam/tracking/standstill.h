@@ -1,14 +1,16 @@
 // A robot that stands. Every match has the noise of its scan, so the pose of a robot that stands would follow the
 // noise: with a cheap lidar by centimetres. While odometry says that the robot stands, and the matches do not
-// contradict, its pose is the mean of the matches since it stopped. The noise of a match is the one that its points
-// show. Before the first motion the pose is the start, which has no error.
-// Odometry can be wrong: wheels freeze or slip, somebody carries the robot. So the robot counts as moved, and the last
-// match is its pose, as soon as one match, or the last few together, differ from the mean by more than their noise.
+// contradict, it is told to be at the mean of the matches since it stopped. The noise of a match is the one that its
+// points show. Before the first motion it is at the start, which has no error.
+// Odometry can be wrong: wheels freeze or slip, somebody carries the robot. So the robot counts as moved, and is told
+// to be where the last match is, as soon as one match, or the last few together, differ from the mean by more than
+// their noise. The track itself is that of the matches: this changes only where the robot is told to be.
 // Frame: poses in `track`. Not thread-safe.
 // Source: the recursive mean; the moving average of the innovations is the chart of Roberts, Technometrics 1959.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "common/geometry/pose2.h"
 #include "server/slam/matching/match_result.h"
@@ -21,8 +23,8 @@ class Standstill {
   void Restart() { *this = {}; }
   // The first scan, at this pose.
   void Begin(const Pose2& T_track_robot, const Pose2& T_odom_robot);
-  // The match of the next scan. Its pose becomes that of the robot that stands, if it does.
-  void Hold(const Pose2& T_odom_robot, MatchResult& match);
+  // Takes the match of the next scan. Returns where the robot stands; nothing if it does not.
+  std::optional<Pose2> Take(const Pose2& T_odom_robot, const MatchResult& match);
   void MoveTo(const Pose2& T_new_old);
 
   template <typename Archive>
