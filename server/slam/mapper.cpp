@@ -172,7 +172,8 @@ void Mapper::State::Draw(const TrackStep& step, bool placed_before) {
 }
 
 ScanOutcome Mapper::State::Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe) {
-  const Pose2 T_keyframe_robot = keyframe ? Pose2{} : trail.FromLast(step.T_track_robot);
+  const bool there = keyframe && !step.T_track_held;  // Where the keyframe is.
+  const Pose2 T_keyframe_robot = there ? Pose2{} : trail.FromLast(step.T_track_held.value_or(step.T_track_robot));
   trail.AddScan(stamp, T_keyframe_robot);
   const FilterEstimate estimate = filter->estimate();
   ScanOutcome outcome;

@@ -104,7 +104,9 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
   level.outcome.score = step.score;
   const Keyframe seen{still, OdometryOrNone(T_odom_robot)};
-  const GridLocalisation::Followed followed = localisation->Take({seen, view.points_robot, step});
+  GridLocalisation::Followed followed = localisation->Take({seen, view.points_robot, step});
+  if (step.T_track_held && !localisation->looking())
+    followed.place.T_map_robot = followed.place.T_map_robot * Between(step.T_track_robot, *step.T_track_held);
   if (followed.is_reference) front_end.AddKeyframe(view);
   return ReportLocalised(still->stamp, T_odom_robot, followed.place, step.score);
 }

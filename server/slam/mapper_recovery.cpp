@@ -314,6 +314,7 @@ ScanOutcome Mapper::State::GoOnAt(const Recovery::Found& found, Keyframe keyfram
   const Pose2 T_track_robot = trail.shapes().back().T_track_robot * Between(T_map_last, place.T_map_robot);
   front_end.MoveTo(T_track_robot * step.T_track_robot.Inverse());
   step.T_track_robot = T_track_robot;
+  step.T_track_held.reset();
   step.found = true;
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   R.topLeftCorner<2, 2>() = T_map_last.rotation().transpose();

@@ -25,7 +25,7 @@ Request OfLab(RequestKind kind) {
 }
 
 // A new format needs a state directory in tests/golden that was written with it; one of site files, a saved site.
-static_assert(slam::kCheckpointFormat == 13);
+static_assert(slam::kCheckpointFormat == 14);
 static_assert(kRecordFormat == 2);
 static_assert(kSiteFileFormat == 2);
 

@@ -29,6 +29,9 @@ struct MatchResult {
   // Information of the surfaces on the translation, in ref and 1/m^2, with the heading left free. Zero where the result
   // does not come from the alignment with surfaces.
   Eigen::Matrix2d surface_information = Eigen::Matrix2d::Zero();
+  // The covariance with the noise that the points themselves show, in place of `residual_sigma_m` for every lidar.
+  // It is the noise of the answer for one scan. Zero where the result does not come from the alignment with surfaces.
+  Eigen::Matrix3d shown_covariance = Eigen::Matrix3d::Zero();
   MatchFailure failure = MatchFailure::kNone;
 };
 

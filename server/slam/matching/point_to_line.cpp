@@ -15,6 +15,8 @@ namespace {
 // The iteration stops when a step turns by less than this and is shorter than stop_step_m. Half or twice the value
 // changes the errors no more than another seed (study `sensitivity`).
 constexpr double kStopStepRad = 2e-4;
+// Where most points are outliers, the derivatives of their weighted distances add up to nothing.
+constexpr double kLeastSlope = 0.2;
 
 // The lower triangle of the sum of weight * J * J', which is all that the solver reads.
 class InformationSum {
@@ -46,11 +48,31 @@ struct Linearisation {
   int inliers = 0;
 };
 
-// `found` has for each point what PointIndex::Nearest left there at the pose before. If `H_surfaces` is not null, H
-// from only the pairs whose reference point has a surface direction is added to it.
+// What is only asked for at the result.
+struct AtTheEnd {
+  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();  // H from only the pairs whose reference point has a direction.
+  // Sums over the pairs: of the weights, of the squares of the weighted distances, and of the derivatives of these.
+  double weights = 0.0, squares = 0.0, derivatives = 0.0;
+
+  // `relative` is the distance as a share of the scale of the Cauchy loss.
+  void AddPair(double weight, double residual, double relative) {
+    weights += weight;
+    squares += weight * weight * residual * residual;
+    derivatives += weight * (1.0 - relative * relative) / (1.0 + relative * relative);
+  }
+  // The factor by which the inverse of H becomes the covariance of the result, in m^2: without outliers, the variance
+  // of the distances. Source: Huber, Ronchetti, Robust Statistics, 2009, (7.81).
+  [[nodiscard]] double Variance() const {
+    const double slope = std::max(derivatives, kLeastSlope * weights);
+    return weights > 0.0 ? squares * weights / (slope * slope) : 0.0;
+  }
+};
+
+// `found` has for each point what PointIndex::Nearest left there at the pose before. If `end` is not null, the pairs
+// are added to its sums.
 Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointIndex& reference,
                         const Pose2& T_ref_robot, double gate_m, const PointToLineOptions& options,
-                        std::span<PointIndex::Found> found, Eigen::Matrix3d* H_surfaces = nullptr) {
+                        std::span<PointIndex::Found> found, AtTheEnd* end = nullptr) {
   Linearisation sum;
   const double c = std::cos(T_ref_robot.theta), s = std::sin(T_ref_robot.theta);
   const double scale = std::max(options.residual_sigma_m, options.cauchy_share * gate_m);
@@ -84,7 +106,10 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
     const double weight = trust / (1.0 + (residual / scale) * (residual / scale));
     const Eigen::Vector3d J(normal.x(), normal.y(), normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
     sum.H.Add(weight, J);
-    if (directed && H_surfaces != nullptr) H_surfaces->noalias() += weight * J * J.transpose();
+    if (end != nullptr) {
+      if (directed) end->H_surfaces.noalias() += weight * J * J.transpose();
+      end->AddPair(weight, residual, residual / scale);
+    }
     sum.g.noalias() += weight * residual * J;
     ++sum.pairs;
     if (std::abs(residual) < options.inlier_distance_m) ++sum.inliers;
@@ -192,8 +217,8 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
     result.iterations = iteration + 1;
     settled = shrink >= 1.0 && step.head<2>().norm() < options.stop_step_m && std::abs(step.z()) < kStopStepRad;
   }
-  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();
-  sum = Linearise(points_robot, reference, T, options.last_pair_distance_m, options, found, &H_surfaces);
+  AtTheEnd end;
+  sum = Linearise(points_robot, reference, T, options.last_pair_distance_m, options, found, &end);
   result.inliers = sum.inliers;
   result.score = static_cast<double>(sum.inliers) / static_cast<double>(points_robot.size());
   if (result.score < options.min_score || sum.pairs < 5) {
@@ -206,10 +231,12 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
   // A reference point without a surface direction seems to constrain all directions, so only surfaces are
   // used to judge degeneracy.
-  DetectDegeneracy(per_point * H_surfaces, result);
-  result.surface_information = per_point * (H_surfaces.topLeftCorner<2, 2>() - H_surfaces.topRightCorner<2, 1>() *
-                                                                                   H_surfaces.bottomLeftCorner<1, 2>() /
-                                                                                   std::max(H_surfaces(2, 2), 1e-12));
+  const Eigen::Matrix3d& shown = end.H_surfaces;
+  DetectDegeneracy(per_point * shown, result);
+  result.surface_information =
+      per_point * (shown.topLeftCorner<2, 2>() -
+                   shown.topRightCorner<2, 1>() * shown.bottomLeftCorner<1, 2>() / std::max(shown(2, 2), 1e-12));
+  result.shown_covariance = end.Variance() * per_point * result.covariance;
   return result;
 }
 

@@ -50,7 +50,13 @@ ScanView Look(const Scan& scan, const FrontEndOptions& options) {
 
 TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) {
   TrackStep step{.T_track_robot = {}, .score = 1.0, .matched = true};
-  if (!history_.empty()) step = Follow(view, T_odom_robot, parallel_for);
+  if (history_.empty()) {
+    standstill_.Begin(step.T_track_robot, T_odom_robot);
+  } else {
+    const MatchResult match = Follow(view, T_odom_robot, parallel_for);
+    step = StepOf(match, T_odom_robot);
+    if (options_.use_odometry) step.T_track_held = standstill_.Take(T_odom_robot, match);
+  }
   score_ = step.score;
   if (options_.use_odometry && !history_.empty()) {
     const double way_m = Between(history_.back().T_odom_robot, T_odom_robot).translation().norm();
@@ -61,7 +67,7 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
   return step;
 }
 
-TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) const {
+MatchResult FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) const {
   const Guess guess = Predict(T_odom_robot);
   Begin(watch_, ScanStep::kMatch);
   MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
@@ -70,10 +76,8 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
   if (!options_.use_odometry && options_.refine_enabled)
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
   Begin(watch_, ScanStep::kRefine);
-  const MatchResult match = options_.refine_enabled
-                                ? Checked(view, T_odom_robot, guess, Refine(view, T_odom_robot, guess, coarse))
-                                : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
-  return StepOf(match, T_odom_robot);
+  return options_.refine_enabled ? Checked(view, T_odom_robot, guess, Refine(view, T_odom_robot, guess, coarse))
+                                 : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
 }
 
 TrackStep FrontEnd::StepOf(const MatchResult& match, const Pose2& T_odom_robot) const {
@@ -117,7 +121,8 @@ std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2&
   Begin(watch_, ScanStep::kRefine);
   const MatchResult match = Align(view, step.T_track_robot, guess);
   const bool better = match.converged && match.score > step.score;
-  const TrackStep again = better ? StepOf(match, T_odom_robot) : step;
+  TrackStep again = better ? StepOf(match, T_odom_robot) : step;
+  again.T_track_held = step.T_track_held;
   score_ = again.score;
   history_.push_back({again.T_track_robot, first.T_odom_robot});
   if (!better) return std::nullopt;
@@ -295,6 +300,7 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
 void FrontEnd::Restart() {
   score_ = 0.0;
   unmatched_m_ = 0.0;
+  standstill_.Restart();
   keyframe_ = {};
   keyframe_view_ = {};
   history_.clear();
@@ -304,6 +310,7 @@ void FrontEnd::Restart() {
 
 void FrontEnd::MoveTo(const Pose2& T_new_old) {
   keyframe_.T_track_robot = T_new_old * keyframe_.T_track_robot;
+  standstill_.MoveTo(T_new_old);
   for (Sight& sight : history_) sight.T_track_robot = T_new_old * sight.T_track_robot;
   for (auto& points : reference_) {
     const std::vector<SurfacePoint> points_old = std::exchange(points, {});

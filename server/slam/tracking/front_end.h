@@ -21,6 +21,7 @@
 #include "server/slam/matching/scan_matcher.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/tracking/scan_steps.h"
+#include "server/slam/tracking/standstill.h"
 
 namespace cairn::slam {
 
@@ -82,8 +83,10 @@ struct TrackStep {
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
   Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
+  // Where a robot that stands is told to be, in `track` (standstill.h). Nothing if it moves.
+  std::optional<Pose2> T_track_held{};
 
-  // Steps are stored only after BlindMotion has used what is not in this list.
+  // Steps are stored only after BlindMotion has used what is not in this list, and the pose has been told.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,
@@ -122,6 +125,9 @@ class FrontEnd {
     archive(self.score_, self.unmatched_m_, self.keyframe_, self.keyframe_view_, self.history_, self.reference_);
     if constexpr (Archive::kReads)
       if (archive.ok()) self.BuildIndices();
+    if constexpr (Archive::kReads)
+      if (archive.format() < 14) return;  // A robot that stands counts from then on.
+    archive(self.standstill_);
   }
 
  private:
@@ -140,8 +146,8 @@ class FrontEnd {
     Pose2 T_track_robot;
     Eigen::Matrix3d covariance;
   };
-  [[nodiscard]] TrackStep Follow(const ScanView& view, const Pose2& T_odom_robot,
-                                 const ParallelFor& parallel_for) const;
+  [[nodiscard]] MatchResult Follow(const ScanView& view, const Pose2& T_odom_robot,
+                                   const ParallelFor& parallel_for) const;
   [[nodiscard]] TrackStep StepOf(const MatchResult& match, const Pose2& T_odom_robot) const;
   [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
   // Alignment with the reference, from `start`; the result is in `track`. In the direction that the surfaces leave
@@ -176,6 +182,7 @@ class FrontEnd {
   // The way of the last scans without a match, less that of the scans with one since then: where it is not zero, a
   // match may correct what odometry did wrong on that way.
   double unmatched_m_ = 0.0;
+  Standstill standstill_;
   // The reference of the matcher, which mostly is the last keyframe, and its points in its robot frame.
   Sight keyframe_;
   ScanView keyframe_view_;

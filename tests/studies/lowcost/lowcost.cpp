@@ -22,6 +22,8 @@ constexpr double kMostShareOfWay = 0.02;
 // The simulated drives, at whatever rate they are scanned. Over the seeds 1 to 3 it was 0.05 to 0.15 m; before
 // odometry's noise counted by distance, up to 1.3 m at 40 scans a second.
 constexpr double kMostErrorSmoothedM = 0.16;
+// A robot that stands for an hour is told to be no farther from where it is.
+constexpr double kMostWhileStandingM = 0.01;
 
 // Every k-th scan such that `share` of them stay.
 StudyLog Thinned(const StudyLog& log, double share) {
@@ -115,7 +117,7 @@ void RunStanding(StudyContext& context) {
     table.Add({model, Count(static_cast<long long>(run.online.size())), Number(1e3 * farthest, 1),
                Number(1e3 * (last.translation() - T_map_robot.translation()).norm(), 1),
                Number(1e3 * AngleDiff(last.theta, T_map_robot.theta), 1)});
-    if (farthest > 0.01) report.Warn(model + ": a standing robot drifts by more than 1 cm");
+    report.Expect(farthest <= kMostWhileStandingM, model + ": a standing robot drifts by more than 1 cm");
   }
   report.Add(table, "standing");
 }
