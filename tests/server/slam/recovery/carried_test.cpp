@@ -38,7 +38,7 @@ class CarriedRobot {
   void TurnOnTheSpot(int scans, const World& others) {
     for (int i = 0; i < scans; ++i) Move({0, 0, 0.25}, others);
   }
-   void Carry(const Pose2& T_world_robot) { truth_ = before_ = T_world_robot; }
+  void Carry(const Pose2& T_world_robot) { truth_ = before_ = T_world_robot; }
   [[nodiscard]] double ErrorM() const { return (last.T_map_robot.translation() - truth_.translation()).norm(); }
   [[nodiscard]] std::string Save() const {
     std::string bytes;
