@@ -96,13 +96,14 @@ INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
                          ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9",
                                            "state-1-checkpoints-10", "state-1-checkpoints-10-dpslam",
                                            "state-1-checkpoints-11-dpslam", "state-1-checkpoints-12",
-                                           "state-1-checkpoints-13", "state-1-ended"),
+                                           "state-1-checkpoints-13", "state-1-checkpoints-14", "state-1-ended"),
                          kNameOf);
 
 class GoldenEndedCheckpoint : public GoldenState {};
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEndedCheckpoint,
                          ::testing::Values("state-1-checkpoints-10", "state-1-checkpoints-11-dpslam",
-                                           "state-1-checkpoints-12", "state-1-checkpoints-13"),
+                                           "state-1-checkpoints-12", "state-1-checkpoints-13",
+                                           "state-1-checkpoints-14"),
                          kNameOf);
 
 TEST_P(GoldenEndedCheckpoint, TheEndIsRestoredFromTheCheckpointAlone) {

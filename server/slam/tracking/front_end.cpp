@@ -276,7 +276,7 @@ MatchResult FrontEnd::Checked(const ScanView& view, const Pose2& T_odom_robot, c
     return Between(sight.T_odom_robot, T_odom_robot).translation().norm() >= kShortestCheckedStepM;
   });
   if (from == history_.rend()) return match;
-  const OdometryStep step{from->T_track_robot, Between(from->T_odom_robot, T_odom_robot), guess.covariance};
+  const CheckedStep step{from->T_track_robot, Between(from->T_odom_robot, T_odom_robot), guess.covariance};
   return CheckAgainstOdometry(view.points_robot, index_, step, match, options_.refine);
 }
 

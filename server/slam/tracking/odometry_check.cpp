@@ -20,8 +20,7 @@ constexpr double kHeldM = 0.002;  // Standard deviation that holds an alignment 
 }  // namespace
 
 MatchResult CheckAgainstOdometry(std::span<const SurfacePoint> points_robot, const PointIndex& reference,
-                                 const OdometryStep& step, const MatchResult& match,
-                                 const PointToLineOptions& options) {
+                                 const CheckedStep& step, const MatchResult& match, const PointToLineOptions& options) {
   if (std::abs(step.T_from_robot.theta) > kTurnRad) return match;
   const Pose2 T_track_expected = step.T_track_from * step.T_from_robot;
   const Eigen::Vector2d expected = T_track_expected.translation() - step.T_track_from.translation();

@@ -16,7 +16,7 @@ namespace cairn::slam {
 inline constexpr double kShortestCheckedStepM = 0.03;
 
 // The motion since an earlier scan as odometry measured it, at least kShortestCheckedStepM.
-struct OdometryStep {
+struct CheckedStep {
   Pose2 T_track_from;
   Pose2 T_from_robot;
   // Of (x, y, theta), along the axes of `track`: how far the pose may be from it across the contradiction.
@@ -27,7 +27,7 @@ struct OdometryStep {
 // surfaces show that the match is right. In that direction the result is then degenerate. REQUIRES: match.converged,
 // and all of it is in the frame `track` of the reference.
 [[nodiscard]] MatchResult CheckAgainstOdometry(std::span<const SurfacePoint> points_robot, const PointIndex& reference,
-                                               const OdometryStep& step, const MatchResult& match,
+                                               const CheckedStep& step, const MatchResult& match,
                                                const PointToLineOptions& options);
 
 }  // namespace cairn::slam
