@@ -86,7 +86,8 @@ TEST(LocaliseIn, ARobotThatIsLookedForEverywhereIsFoundAndFollowed) {
         std::find_if(mapped.begin(), mapped.end(), [&](const ScanOutcome& other) { return other.stamp == one.stamp; });
     if (same == mapped.end() || !one.localized) continue;
     ++compared;
-    EXPECT_LT((one.T_map_robot.translation() - same->T_map_robot.translation()).norm(), 0.2);
+    // The robot that maps bends its map on the second half as well.
+    EXPECT_LT((one.T_map_robot.translation() - same->T_map_robot.translation()).norm(), 0.3);
   }
   EXPECT_GT(compared, 300U);
   // Nothing was mapped.
