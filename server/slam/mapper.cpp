@@ -31,7 +31,9 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
     passage = s.LocaliseAfter(passage, tilted);
     if (tilted)
       return s.ReportLocalised(stamp, T_odom_robot, s.localisation->CarriedTo(s.OdometryOrNone(T_odom_robot)), 0.0);
-    if (passage != Passage::kDriven || s.localisation->looking()) rolling = nullptr;
+    // As for a robot that maps: one that is only doubted has been followed without a gap.
+    const bool doubted = s.localisation->recovery().doubt().has_value();
+    if (passage != Passage::kDriven || (s.localisation->looking() && !doubted)) rolling = nullptr;
     TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
                                     std::move(scan), rolling, T_odom_robot, parallel_for);
     return s.Localise(std::move(tracked), T_odom_robot, passage, rolling != nullptr, parallel_for);

@@ -2,7 +2,8 @@
 // quarter of a metre the scan is aligned with the surfaces of the map, and the answer is fused with the pose. Where the
 // map shows nothing, the pose goes on with growing doubt. The robot is lost where that doubt is too large, or where the
 // scans contradict the map over some metres, and it is doubted where somebody may have carried it between two scans
-// (recovery/carried.h). It is then looked for as one that was not watched (recovery.h), in this map. People, and
+// (recovery/carried.h). It is then looked for as one that was not watched (recovery.h), in this map, until it is found:
+// unlike a robot that maps, it does not go on along its path where it is found nowhere else. People, and
 // furniture that has moved, contradict in some places; that is borne, because it does not contradict for metres
 // everywhere. Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic. Source: the extended
 // Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points and

@@ -119,12 +119,14 @@ void LikelihoodPyramid::SumsOfRow(std::span<const Cell> cells, int x, int y, std
 LikelihoodPyramid::Pattern LikelihoodPyramid::PatternOf(std::vector<Cell> cells) const {
   Pattern pattern{std::move(cells), {}, {}, {}};
   if (!pattern.cells.empty()) pattern.low = pattern.high = pattern.cells.front();
-  pattern.offsets.reserve(pattern.cells.size());
   for (const Cell& cell : pattern.cells) {
-    pattern.offsets.push_back(cell.y * width_ + cell.x);
     pattern.low = {std::min(pattern.low.x, cell.x), std::min(pattern.low.y, cell.y)};
     pattern.high = {std::max(pattern.high.x, cell.x), std::max(pattern.high.y, cell.y)};
   }
+  // From the lowest cell: far from the origin of the map, products of the cells themselves would overflow.
+  pattern.offsets.reserve(pattern.cells.size());
+  for (const Cell& cell : pattern.cells)
+    pattern.offsets.push_back(std::ptrdiff_t{cell.y - pattern.low.y} * width_ + (cell.x - pattern.low.x));
   return pattern;
 }
 
@@ -142,7 +144,7 @@ LikelihoodPyramid::SumsFrom LikelihoodPyramid::SumsOfBest(int level, const Patte
   const auto width = static_cast<std::uint32_t>(width_), height = static_cast<std::uint32_t>(height_);
   const bool inside = pattern.low.x + to_column >= 0 && pattern.high.x + to_column < width_ &&
                       pattern.low.y + to_row >= 0 && pattern.high.y + to_row < height_;
-  const std::ptrdiff_t origin = std::ptrdiff_t{to_row} * width_ + to_column;
+  const std::ptrdiff_t lowest = std::ptrdiff_t{pattern.low.y + to_row} * width_ + (pattern.low.x + to_column);
   SumsFrom sums{};
   std::int32_t sum = 0;
   for (std::size_t part = 0; part < kParts; ++part) {
@@ -150,7 +152,7 @@ LikelihoodPyramid::SumsFrom LikelihoodPyramid::SumsOfBest(int level, const Patte
     std::int32_t of_part = 0;
     const std::size_t end = BeginOf(part + 1, pattern);
     if (inside) {
-      for (std::size_t i = BeginOf(part, pattern); i < end; ++i) of_part += raster[origin + pattern.offsets[i]];
+      for (std::size_t i = BeginOf(part, pattern); i < end; ++i) of_part += raster[lowest + pattern.offsets[i]];
     } else {
       for (std::size_t i = BeginOf(part, pattern); i < end; ++i) {
         // As unsigned numbers, cells to the left and below are too large as well.

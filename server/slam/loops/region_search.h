@@ -43,8 +43,9 @@ class LikelihoodPyramid {
   static constexpr std::size_t kParts = 8;
   struct Pattern {
     std::vector<Cell> cells;
-    std::vector<std::int32_t> offsets;  // Of the cells within the rasters of the pyramid that it was made for.
-    Cell low, high;                     // No cell is lower or higher.
+    // Of the cells, from the lowest one, within the rasters of the pyramid that it was made for.
+    std::vector<std::ptrdiff_t> offsets;
+    Cell low, high;  // No cell is lower or higher.
   };
   [[nodiscard]] Pattern PatternOf(std::vector<Cell> cells) const;
   // Sums over the parts from each part on: the first is the sum over all cells.

@@ -62,7 +62,7 @@ void Visit(OptionVisitor& visitor, RevisitOptions& options) {
   visitor.Real(
       "sigma_m", options.sigma_m, "m", 0.0, 5.0,
       "Standard deviation that is added to the position of a match, because neighbouring matches have similar errors. "
-      "With 0.1 the path that is known of intel without a job is 1.18 times as far from the truth.");
+      "A larger value trusts a single match less.");
 }
 
 RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align)

@@ -10,7 +10,8 @@
 namespace cairn::slam {
 namespace {
 
-constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
+// Scans that are kept: turning on the spot makes many. Those that are being searched for are kept until that has ended.
+constexpr std::size_t kMaxRecent = 120;
 constexpr std::size_t kMaxHeld = 120;  // Keyframes that may be added to the path at once: bounds the time of one scan.
 // Scans for which a place that a job has found is looked at: a minute of most lidars.
 constexpr int kMaxScansSuggested = 600;
@@ -26,7 +27,7 @@ constexpr double kDriftRadPerM = 0.0005;
 constexpr double kFarthestM = 10.0;
 constexpr double kEverywhereEveryM = 4.0;
 // Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
-// its path is waited for by nobody. One that is lost is to be found soon.
+// its path is waited for by nobody. One that is lost, or may have been carried, is to be found soon.
 constexpr int kBlocksOnPath = 60'000;
 constexpr int kBlocksLost = 200'000;
 
@@ -188,6 +189,7 @@ std::optional<FoundPlace> Recovery::SearchOn(const SearchedMap& map) {
   if (search_.searching()) {
     if (!search_.GoOn(BlocksPerScan())) return std::nullopt;
     auto place = search_.End(map, recent_);
+    if (doubt_) doubt_->searched = true;
     if (place && IsConfirmed(place->T_map_robot, searched_at_m_)) return place;
   }
   const bool followed = said_ && T_map_track_.has_value();
@@ -207,7 +209,7 @@ void Recovery::BeginSearch(const SearchedMap& map, std::span<const RecentScan> r
 }
 
 int Recovery::BlocksPerScan() const {
-  return T_map_track_ ? kBlocksOnPath : kBlocksLost;
+  return T_map_track_ && !doubt_ ? kBlocksOnPath : kBlocksLost;
 }
 
 // After a restart: one part was done with each scan since the search began.
@@ -241,7 +243,7 @@ bool Recovery::IsConfirmed(const Pose2& T_map_robot, double seen_m) {
     unconfirmed_.clear();
   }
   if (!unconfirmed_.empty() &&
-      (now.travelled_m - unconfirmed_.back().travelled_m > kConfirmWithinM || !Agree(unconfirmed_.back(), T_map_robot)))
+      (seen_m - unconfirmed_.back().travelled_m > kConfirmWithinM || !Agree(unconfirmed_.back(), T_map_robot)))
     unconfirmed_.clear();
   const bool confirmed = !unconfirmed_.empty() && Agree(unconfirmed_.front(), T_map_robot) &&
                          seen_m - unconfirmed_.front().travelled_m >= loop_.confirm_after_m;

@@ -118,15 +118,19 @@ class Recovery {
   struct Doubt {
     SceneAgreement before;  // Of the last scan with the last keyframes.
     bool likely = false;    // Most of the scan after it was not explained.
+    bool searched = false;  // The whole map has been searched for the robot since then.
 
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
       archive(self.before, self.likely);
+      bool has_searched = true;
+      if constexpr (Archive::kReads) has_searched = archive.format() >= 14;
+      if (has_searched) archive(self.searched);
     }
   };
   // REQUIRES: on_path.
   void BeginDoubt(const SceneAgreement& before, double score) {
-    doubt_ = Doubt{before, score < options_.place.min_explained};
+    doubt_ = Doubt{before, score < options_.place.min_explained, false};
   }
   [[nodiscard]] const std::optional<Doubt>& doubt() const { return doubt_; }
   // Whether it has been doubted for so long that it counts as carried.
@@ -134,7 +138,7 @@ class Recovery {
   // Whether it was not likely, and has been found nowhere else on so much way that something else must have changed: a
   // door was closed, or furniture was moved.
   [[nodiscard]] bool doubted_in_vain() const {
-    return doubt_ && !doubt_->likely && has_scans() && recent_.back().travelled_m > kDoubtedInVainM;
+    return doubt_ && !doubt_->likely && doubt_->searched && has_scans() && recent_.back().travelled_m > kDoubtedInVainM;
   }
   // Where the robot may be now: at the places found that are not confirmed.
   [[nodiscard]] std::vector<Pose2> Unconfirmed() const;
@@ -170,9 +174,16 @@ class Recovery {
     bool has_doubt = true;
     if constexpr (Archive::kReads) has_doubt = archive.format() >= 13;
     if (has_doubt) archive(self.doubt_);
+    bool searching = true;  // Before format 14 all searches ended with the scan with which they began.
+    if constexpr (Archive::kReads) {
+      if (archive.format() >= 14) archive(searching);
+    } else {
+      searching = self.search_.searching() || self.restored_;
+      archive(searching);
+    }
     if constexpr (Archive::kReads) {
       self.search_.Forget();
-      self.restored_ = true;
+      self.restored_ = searching;
       self.suggestion_.reset();  // Not saved (Mapper::has_suggestion).
       archive.Require(!self.doubt_ || (self.active_ && !self.said_ && self.on_path()),
                       "a robot that may have been carried");
@@ -229,8 +240,8 @@ class Recovery {
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.
   std::optional<Doubt> doubt_;
-  double searched_at_m_ = 0.0;  // The way at the last of the scans that are, or were last, searched for everywhere.
-  bool restored_ = false;       // What has been searched for in parts is still to be searched for again.
+  double searched_at_m_ = -1.0;  // The way at the last of the scans that are, or were last, searched for everywhere.
+  bool restored_ = false;        // What has been searched for in parts is still to be searched for again.
   std::vector<RecentScan> recent_;
   std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.
   std::vector<Candidate> unconfirmed_;

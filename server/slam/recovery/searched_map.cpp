@@ -36,10 +36,12 @@ IndexedSurfaces::IndexedSurfaces(std::vector<SurfacePoint> given, double cell_sc
 std::shared_ptr<const IndexedSurfaces> PathMap::Index() const {
   std::vector<SurfacePoint> surfaces;
   OnePerCell cells(0.5 * kSearchCellM);
+  if (trail_.size() == 0) return std::make_shared<const IndexedSurfaces>(std::move(surfaces), options_.cell_scale);
+  const Eigen::Vector2d middle = middle_.value_or(path_[trail_.size() - 1].translation());
   for (std::size_t k = 0; k < trail_.size(); ++k) {
     const Pose2& T_map_k = path_[k];
     if (!trail_.keyframes()[k].localized) continue;
-    const Eigen::Vector2d away_m = T_map_k.translation() - path_[trail_.size() - 1].translation();
+    const Eigen::Vector2d away_m = T_map_k.translation() - middle;
     if (away_m.cwiseAbs().maxCoeff() > options_.map_reach_m) continue;
     const Eigen::Matrix2d R = T_map_k.rotation();
     const SharedPoints points = trail_.points(k);

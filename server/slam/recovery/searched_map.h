@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <unordered_set>
 #include <vector>
 
@@ -48,9 +49,11 @@ class SearchedMap {
 // localized are left out. Does not own its arguments.
 class PathMap final : public SearchedMap {
  public:
-  // `near_m`: as SelfCheckOptions.
-  PathMap(const Trail& trail, const PosePath& path, const PlaceSearchOptions& options, double near_m)
-      : trail_(trail), path_(path), options_(options), near_m_(near_m) {}
+  // `near_m`: as SelfCheckOptions. The part within PlaceSearchOptions::map_reach_m of `middle`, otherwise of the last
+  // pose, is searched.
+  PathMap(const Trail& trail, const PosePath& path, const PlaceSearchOptions& options, double near_m,
+          const std::optional<Eigen::Vector2d>& middle = std::nullopt)
+      : trail_(trail), path_(path), options_(options), near_m_(near_m), middle_(middle) {}
   [[nodiscard]] std::shared_ptr<const IndexedSurfaces> Index() const override;
   [[nodiscard]] VisibilityCounts Compare(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
                                          const Pose2& T_map_robot) const override;
@@ -60,6 +63,7 @@ class PathMap final : public SearchedMap {
   const PosePath& path_;
   const PlaceSearchOptions& options_;
   double near_m_;
+  std::optional<Eigen::Vector2d> middle_;
 };
 
 // Takes the first point of each cell of a raster.

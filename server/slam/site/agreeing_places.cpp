@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -17,6 +18,7 @@ constexpr std::size_t kMinPlaces = 3;  // Recognised places that must agree befo
 constexpr double kMinCoveredM = 24.0;
 constexpr std::size_t kEnoughPlaces = 5;                   // With so many the search ends.
 constexpr std::array<std::size_t, 4> kPasses{0, 2, 1, 3};  // Each looks at every fourth place, from this one on.
+constexpr double kMostOfLength = 1.5;  // A place is at most so many times as long in one session as in the other.
 // A search that will soon be made again ends where so many passes have found no place.
 constexpr std::size_t kFirstPasses = 2;
 
@@ -54,7 +56,10 @@ Recognised InBoth(const SessionRelation& place, const SessionMap& known, const S
   const Pose2 T_known_first = known.own_path()[place.from.keyframe] * place.T_from_to *
                               Between(seen.own_path()[place.to.keyframe], seen.own_path()[first]);
   both.in_a.Add(known.travelled_m(place.from.keyframe));
-  both.in_a.Add(known.travelled_m(known.NearestTo(T_known_first)));
+  // Not that of another pass through the same place: the place would seem to cover all the way between the two.
+  const double first_m = known.travelled_m(known.NearestTo(T_known_first));
+  const double most_m = kMostOfLength * (both.in_b.high_m - both.in_b.low_m);
+  if (std::abs(first_m - known.travelled_m(place.from.keyframe)) <= most_m) both.in_a.Add(first_m);
   return both;
 }
 

@@ -337,7 +337,7 @@ std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionM
 
 std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, const PlacedSession& seen,
                                                  std::span<const Tie> ties, const SiteOptions& options,
-                                                 const GoOn& go_on, RelationBook& book, NearbySearchKind kind) {
+                                                 const GoOn& go_on, RelationBook& book) {
   Asking goes_on(go_on);
   NearbySearch search(known, seen, ties, options, book);
   std::vector<SessionRelation> found;
@@ -350,7 +350,6 @@ std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, con
     found.push_back(*std::move(revisit));
     revisited_m.push_back(seen.map.travelled_m(k));
   }
-  if (kind == NearbySearchKind::kRevisits) return found;
 
   std::vector<SessionRelation> stretches;
   double next_m = 0.0;

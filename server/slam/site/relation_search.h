@@ -12,7 +12,6 @@
 // was found so far is returned and must not be used.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -52,12 +51,9 @@ struct Tie {
   std::size_t seen = 0;
 };
 
-enum class NearbySearchKind : std::uint8_t { kRevisitsAndStretches = 0, kRevisits };
-
-// Revisits and stretches near the believed paths: relations from `known` to `seen`. `ties` must not be empty. Stretches
-// take most of the time.
-[[nodiscard]] std::vector<SessionRelation> FindRelationsNearby(
-    const PlacedSession& known, const PlacedSession& seen, std::span<const Tie> ties, const SiteOptions& options,
-    const GoOn& go_on, RelationBook& book, NearbySearchKind kind = NearbySearchKind::kRevisitsAndStretches);
+// Revisits and stretches near the believed paths: relations from `known` to `seen`. `ties` must not be empty.
+[[nodiscard]] std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, const PlacedSession& seen,
+                                                               std::span<const Tie> ties, const SiteOptions& options,
+                                                               const GoOn& go_on, RelationBook& book);
 
 }  // namespace cairn::slam

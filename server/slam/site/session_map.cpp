@@ -1,5 +1,6 @@
 #include "server/slam/site/session_map.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -11,10 +12,20 @@ namespace cairn::slam {
 
 namespace {
 
-// A robot looks for itself in the map around it. A session is compared with all of another one, and with all of itself:
-// a place proves nothing if another one anywhere looks the same.
-PlaceSearchOptions WithoutReach(PlaceSearchOptions options) {
-  options.map_reach_m = std::numeric_limits<double>::infinity();
+// A session is compared with all of another one, and with all of itself: a place proves nothing if another one anywhere
+// looks the same. A robot looks for itself in the map around it, and this is around the middle of the path. Of a larger
+// session, what lies farther out is not searched: the search of one that is wider than 575 m would reach its bound
+// on work (kMaxBlocks), and find nothing.
+constexpr double kMostReachM = 280.0;
+
+Eigen::Vector2d MiddleOf(const std::vector<Pose2>& path) {
+  Eigen::AlignedBox2d box;
+  for (const Pose2& pose : path) box.extend(pose.translation());
+  return path.empty() ? Eigen::Vector2d::Zero().eval() : box.center().eval();
+}
+
+PlaceSearchOptions WithReach(PlaceSearchOptions options) {
+  options.map_reach_m = kMostReachM;
   return options;
 }
 
@@ -42,7 +53,8 @@ SessionMap::SessionMap(std::uint64_t session, const MapperSnapshot& snapshot, st
       relations_(MeasuredIn(snapshot, own_path, options.drift)),
       own_path_(std::move(own_path)),
       trail_(MotionNoise{}, options.surface),
-      place_(WithoutReach(options.place)),
+      place_(WithReach(options.place)),
+      middle_(MiddleOf(own_path_)),
       near_m_(options.self_check.near_m),
       places_(options.place, options.loop, options.self_check, options.align) {
   for (std::size_t k = 0; k < own_path_.size(); ++k) {
@@ -76,10 +88,11 @@ std::vector<RecentScan> SessionMap::ScansAround(std::size_t keyframe, double way
 }
 
 std::optional<FoundPlace> SessionMap::Find(std::span<const RecentScan> scans) {
-  // Most places are not in the other map. A place counts only if this share of it is explained, and to find out that no
-  // pose explains so much takes a fraction of the time in which the best pose is found.
+  // Most places are not in the other map. To find out that no pose is likely enough takes a fraction of the time in
+  // which the best pose is found. Places that were accepted had a likelihood of 0.74 and more.
+  constexpr double kLeastLikelihood = 0.7;
   constexpr Pose2 kNowhere{1e6, 1e6, 0.0};
-  if (!places_.FitsElsewhere(map(), scans, kNowhere, place_.min_explained)) return std::nullopt;
+  if (!places_.FitsElsewhere(map(), scans, kNowhere, kLeastLikelihood)) return std::nullopt;
   return places_.Find(map(), scans);
 }
 

@@ -75,7 +75,7 @@ class SessionMap {
   void ForgetPlaces() { places_.Forget(); }
 
  private:
-  [[nodiscard]] PathMap map() const { return {trail_, shared_own_path_, place_, near_m_}; }
+  [[nodiscard]] PathMap map() const { return {trail_, shared_own_path_, place_, near_m_, middle_}; }
 
   std::uint64_t session_;
   std::vector<PoseRelation> relations_;
@@ -84,6 +84,7 @@ class SessionMap {
   Trail trail_;
   std::vector<KeyframeId> ids_;  // Of the keyframes.
   PlaceSearchOptions place_;
+  Eigen::Vector2d middle_;  // Of the own path.
   double near_m_;
   PlaceSearch places_;
 };

@@ -154,21 +154,12 @@ class Smoothing {
   }
 
   bool JoinByPlaces() {
-    std::vector<Pair> left = Pairs();
+    std::vector<Pair> pairs = Pairs();
     // A robot that is joined is to be told so at once; the pairs that it makes worth a search wait for the next job.
-    if (search_ != SiteSearch::kAll) std::erase_if(left, [this](const Pair& pair) { return !IsToBeSearched(pair); });
-    const std::size_t all = left.size();
-    // A fragment that is joined makes pairs of others worth a search that were not before.
-    for (auto next = left.begin(); next != left.end();) {
-      Done(kShareOfPlaces * static_cast<double>(all - left.size()) / static_cast<double>(all));
-      const Pair pair = *next;
-      if (!IsToBeSearched(pair)) {
-        ++next;
-        continue;
-      }
-      left.erase(next);
-      if (!JoinPair(pair)) return false;
-      next = left.begin();
+    std::erase_if(pairs, [this](const Pair& pair) { return !IsToBeSearched(pair); });
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      Done(kShareOfPlaces * static_cast<double>(i) / static_cast<double>(pairs.size()));
+      if (IsToBeSearched(pairs[i]) && !JoinPair(pairs[i])) return false;  // Others may have been joined meanwhile.
     }
     for (SessionMap& map : maps_) map.ForgetPlaces();
     Done(kShareOfPlaces);
@@ -190,16 +181,6 @@ class Smoothing {
     if (places.empty()) return true;
     const SiteGraph before = graph_;
     if (!Try(a, b, places)) return false;
-    if (search_ != SiteSearch::kAll) {  // A robot that waits to be joined drives on meanwhile.
-      // The places stay: revisits in a corridor do not show where along it the robot is.
-      std::vector<SessionRelation> both = places;
-      const auto revisits = SearchNearby(a, b, TiesOf(a, b), NearbySearchKind::kRevisits);
-      both.insert(both.end(), revisits.begin(), revisits.end());
-      if (!go_on_(done_) || !Try(a, b, both)) return false;
-      if (IsTrusted(a, b)) return true;
-      TakeBack(before);
-      if (!Try(a, b, places)) return false;
-    }
     const auto found = SearchNearby(a, b, TiesOf(a, b));
     if (!go_on_(done_) || !Try(a, b, found)) return false;
     if (!IsTrusted(a, b)) TakeBack(before);
@@ -305,11 +286,9 @@ class Smoothing {
     return path;
   }
 
-  [[nodiscard]] std::vector<SessionRelation> SearchNearby(
-      std::size_t a, std::size_t b, std::span<const Tie> ties,
-      NearbySearchKind kind = NearbySearchKind::kRevisitsAndStretches) {
+  [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties) {
     const PosePath path_a = PathOf(a), path_b = PathOf(b);
-    return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book_, kind);
+    return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book_);
   }
 
   // The relations between two sessions, some metres apart. Sessions that are related only through others are tied where

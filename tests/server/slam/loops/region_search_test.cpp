@@ -135,6 +135,21 @@ TEST(RegionSearch, AgreesWithTryingEveryPose) {
   }
 }
 
+// A site may lie anywhere within 1,000 km of the origin of its map.
+TEST(RegionSearch, FindsThePoseInAMapThatIsFarFromItsOrigin) {
+  std::vector<SurfacePoint> world = Hall();
+  const Eigen::Vector2d away(-700e3, 900e3);
+  for (SurfacePoint& point : world) point.p += away;
+  const Pose2 truth{away.x() + 2.0, away.y() + 1.5, 0.3};
+  const std::vector<Eigen::Vector2d> points = SeenFrom(truth, world);
+  for (double x = 0.0; x < 160.0; x += 0.05)  // A long wall makes the rasters wide.
+    world.push_back({away + Eigen::Vector2d(x, 9.0), Eigen::Vector2d::UnitX()});
+  const LikelihoodPyramid pyramid(world, kCellM, 0.3, 5);
+  const auto peak = FindBestPose(points, pyramid, {{truth.x + 1.0, truth.y - 0.7, 0.4}, 2.0, 0.3}, 0.3);
+  ASSERT_TRUE(peak);
+  EXPECT_LT((peak->T_ref_curr.translation() - truth.translation()).norm(), 0.15);
+}
+
 TEST(RegionSearch, InPartsItFindsTheSame) {
   const std::vector<SurfacePoint> hall = Hall();
   const LikelihoodPyramid pyramid(hall, kCellM, 0.3, 5);
