@@ -124,11 +124,14 @@ TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
   EXPECT_FALSE(apart->version->parts.at(1).fragment);
   EXPECT_FALSE(apart->version->smoothed.contains("r2"));
 
-  // A job that only joins makes the same version, and none where there is nothing to join.
+  // A job that only joins begins with other places and makes nearly the same version, and none where there is nothing.
   job_.kind = JobKind::kJoin;
   const auto joined = SmoothSite(job_, material, &options, control_);
   ASSERT_TRUE(joined && joined->version);
-  EXPECT_EQ(*joined->version->parts.at(2).path, *moved.path);
+  const std::vector<Pose2>& joined_path = *joined->version->parts.at(2).path;
+  ASSERT_EQ(joined_path.size(), moved.path->size());
+  for (std::size_t k = 0; k < joined_path.size(); ++k)
+    EXPECT_LT((joined_path[k].translation() - (*moved.path)[k].translation()).norm(), 0.05) << k;
   const auto nothing = SmoothSite(job_, {material[0]}, &options, control_);
   ASSERT_TRUE(nothing);
   EXPECT_FALSE(nothing->version);
