@@ -103,6 +103,7 @@ std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, st
   };
   const auto relations = [&agreeing] {
     std::vector<SessionRelation> relations_of_all;
+    relations_of_all.reserve(agreeing.size());
     for (const Recognised& one : agreeing) relations_of_all.push_back(one.relation);
     return relations_of_all;
   };
