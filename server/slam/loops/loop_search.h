@@ -2,7 +2,7 @@
 // compares the surfaces seen over the last metres (not one scan) with the surroundings of old keyframes, over
 // a search window as wide as the uncertainty. A match is accepted only if no other pose fits nearly as well,
 // if no surface lies where beams passed, and if a second comparison some metres later agrees, also without the
-// scans of the first one. It prefers a late closure to a wrong one. Small loops are found by RevisitSearch. Not
+// scans of the first one. A late closure is better than a wrong one. Small loops are found by RevisitSearch. Not
 // thread-safe. Source: matching by branch and bound as in Hess et al., ICRA 2016; confirmation by agreement between
 // closures as in Olson 2009 (Recognizing places using spectrally clustered local matches), in its simplest
 // form.
