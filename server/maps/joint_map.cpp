@@ -19,6 +19,17 @@ JointMap::JointMap(double past_probability) : most_past_(slam::LogOddsOf(past_pr
 
 void JointMap::Apply(const GridChange& change) {
   for (const auto& [key, chunk] : change.chunks) SetLayer(key, change.session, chunk);
+  NoteLooks(change.session, change.looks);
+}
+
+void JointMap::NoteLooks(SessionId session, const slam::OccupancyGrid::Looks& looks) {
+  if (hidden_.contains(session)) return;
+  for (const auto& [key, cells] : looks) {
+    const auto layers = chunks_.find(key);
+    if (layers == chunks_.end() || layers->second.size() < 2 || !layers->second.contains(session)) continue;
+    last_looks_[key].Note(session, cells);
+    dirty_.insert(key);
+  }
 }
 
 void JointMap::Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
@@ -58,7 +69,8 @@ slam::OccupancyGrid::Chunks JointMap::DrawnBefore(SessionId session) const {
   for (const slam::ChunkKey& key : area) {
     const auto layers = chunks_.find(key);
     if (layers == chunks_.end()) continue;
-    if (auto chunk = SumOf(layers->second, [&](SessionId other) { return other < session; }))
+    if (auto chunk = SumOf(
+            layers->second, [&](SessionId other) { return other < session; }, nullptr))
       sum.emplace(key, std::move(chunk));
   }
   return sum;
@@ -155,11 +167,13 @@ void JointMap::MergePast(SessionId older, SessionId later) {
     dirty_ = changed;
   in_order.erase(second);
   *std::ranges::find(in_order, older) = later;
+  for (auto& [key, last] : last_looks_) last.Replace(older, later);
   SetPastOrder(in_order);
 }
 
 void JointMap::Remove(SessionId session) {
   Replace(session, {});
+  for (auto& [key, last] : last_looks_) last.Forget(session);
   hidden_.erase(session);
   std::vector<SessionId> in_order = past();
   std::erase(in_order, session);
@@ -181,6 +195,7 @@ void JointMap::SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<c
   const auto found = chunks_.find(key);
   if (found == chunks_.end()) return;
   found->second.erase(session);
+  if (found->second.size() < 2) last_looks_.erase(key);
   if (found->second.empty()) chunks_.erase(found);
 }
 
@@ -211,39 +226,60 @@ void JointMap::Count(MemoryCount& memory) const {
   for (const auto& [key, layers] : chunks_) {
     for (const auto& [session, chunk] : layers) memory.Add(chunk, sizeof(slam::GridChunk));
   }
+  memory.Add(last_looks_.size() * sizeof(LastLooks));
   for (const TilePyramid* pyramid : {&sum_, &disagreement_}) {
     for (const auto& [key, cells] : pyramid->cells()) memory.Add(cells, sizeof(TileCells));
   }
 }
 
 template <typename Counts>
-std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, const Counts& counts) const {
-  using Chunk = std::shared_ptr<const slam::GridChunk>;
-  std::map<std::size_t, const Chunk*> past;  // In the order in which their sessions ended.
-  std::vector<const Chunk*> present;
-  for (const auto& [session, chunk] : layers) {
-    if (hidden_.contains(session) || !counts(session)) continue;
-    const auto ended = past_.find(session);
+std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, const Counts& counts,
+                                                       const LastLooks* last) const {
+  using Layer = Layers::value_type;
+  std::map<std::size_t, const Layer*> past;  // In the order in which their sessions ended.
+  std::vector<const Layer*> present;
+  for (const Layer& layer : layers) {
+    if (hidden_.contains(layer.first) || !counts(layer.first)) continue;
+    const auto ended = past_.find(layer.first);
     if (ended == past_.end()) {
-      present.push_back(&chunk);
+      present.push_back(&layer);
     } else {
-      past.emplace(ended->second, &chunk);
+      past.emplace(ended->second, &layer);
     }
   }
   if (past.empty() && present.empty()) return nullptr;
-  if (past.size() + present.size() == 1) return past.empty() ? *present.front() : *past.begin()->second;
+  if (past.size() + present.size() == 1) return (past.empty() ? present.front() : past.begin()->second)->second;
+  // First what others have looked at since, then each cell of the session that has looked at it last.
+  const auto number_of = [last](const Layer& layer) {
+    return last == nullptr ? std::uint8_t{0} : last->NumberOf(layer.first);
+  };
+  const auto older = [last, &number_of](const Layer& layer) {
+    return
+        [last, number = number_of(layer)](std::size_t cell) { return number == 0 || last->numbers()[cell] != number; };
+  };
   auto sum = std::make_shared<slam::GridChunk>(UnseenChunk());
-  for (const auto& [before, chunk] : past) AddLater(*sum, **chunk, most_past_);
+  for (const auto& [before, layer] : past) AddLater(*sum, *layer->second, most_past_, older(*layer));
   slam::GridChunk now = UnseenChunk();
-  for (const auto* const chunk : present) AddBeside(now, **chunk);
+  for (const Layer* const layer : present) AddBeside(now, *layer->second, older(*layer));
   AddLater(*sum, now, most_past_);
+  const auto add_last = [&](const Layer& layer) {
+    const std::uint8_t number = number_of(layer);
+    if (number == 0) return;
+    AddLater(*sum, *layer.second, most_past_, [&](std::size_t cell) { return last->numbers()[cell] == number; });
+  };
+  for (const auto& [before, layer] : past) add_last(*layer);
+  for (const Layer* const layer : present) add_last(*layer);
   return sum;
 }
 
 JointMap::Cells JointMap::Sum(slam::ChunkKey key) const {
   const auto found = chunks_.find(key);
   const auto edits = edits_.find(key);
-  const auto sum = found == chunks_.end() ? nullptr : SumOf(found->second, [](SessionId) { return true; });
+  const auto looks = last_looks_.find(key);
+  const LastLooks* const last = looks == last_looks_.end() ? nullptr : &looks->second;
+  const auto sum = found == chunks_.end() ? nullptr
+                                          : SumOf(
+                                                found->second, [](SessionId) { return true; }, last);
   if (sum == nullptr && edits == edits_.end()) return nullptr;
   auto cells = std::make_shared<TileCells>();
   if (sum == nullptr) {

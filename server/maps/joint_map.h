@@ -1,9 +1,9 @@
 // The joint occupancy map of a site, and its pyramid of coarser levels. For each chunk, the grids of all sessions are
-// summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). The start
-// poses place the robots in one map frame. This class does not publish: Render returns the tiles whose cells changed;
-// epochs, versions and encodings are handled by Site. Invariant: after Render, cells() equals a map that is built from
-// scratch from the same chunks and edits, with the same sessions hidden and ended. Not thread-safe: used on the site's
-// strand only.
+// summed into the cells of one tile, with less weight for those of sessions that have ended, and for what others have
+// looked at later (layer_sum.h). The start poses place the robots in one map frame. This class does not publish: Render
+// returns the tiles whose cells changed; epochs, versions and encodings are handled by Site. Invariant: after Render,
+// cells() equals a map that is built from scratch from the same chunks and edits, with the same sessions hidden and
+// ended, and the same looks. Not thread-safe: used on the site's strand only.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/map/tile.h"
+#include "server/maps/last_looks.h"
 #include "server/maps/map_edits.h"
 #include "server/maps/memory_count.h"
 #include "server/maps/robot_grid.h"
@@ -27,10 +28,12 @@ class JointMap {
  public:
   using Cells = TilePyramid::Cells;
 
-  // `past_probability`: the largest probability that ended sessions give a cell that a later one has seen as well.
+  // `past_probability`: the largest probability that earlier evidence gives a cell that a session has seen later.
   explicit JointMap(double past_probability);
 
-  // Applies the changed chunks of one session (null: removed).
+  // Applies the changed chunks of one session (null: removed). It has looked at the cells of the change later than all
+  // others. Who was the last is noted where at least two sessions have drawn, and is not stored: after a restart
+  // sessions that go on add up until they look again.
   void Apply(const GridChange& change);
   // Replaces the whole grid of one session.
   void Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
@@ -88,7 +91,9 @@ class JointMap {
 
   // Of the sessions that `counts` accepts. Null: they have drawn nothing there.
   template <typename Counts>
-  [[nodiscard]] std::shared_ptr<const slam::GridChunk> SumOf(const Layers& layers, const Counts& counts) const;
+  [[nodiscard]] std::shared_ptr<const slam::GridChunk> SumOf(const Layers& layers, const Counts& counts,
+                                                             const LastLooks* last) const;
+  void NoteLooks(SessionId session, const slam::OccupancyGrid::Looks& looks);
   [[nodiscard]] bool IsShown(const Layers& layers) const;
   void MarkChanged(SessionId session);
   void SetPastOrder(const std::vector<SessionId>& in_order);
@@ -100,6 +105,7 @@ class JointMap {
 
   const int most_past_;  // Log odds.
   std::map<slam::ChunkKey, Layers> chunks_;
+  std::map<slam::ChunkKey, LastLooks> last_looks_;
   EditOverlay edits_;
   std::set<SessionId> hidden_;
   std::map<SessionId, std::size_t> past_;             // Sessions that have ended, and how many had before.

@@ -1,19 +1,40 @@
-// How the grids that several sessions have drawn of the same place become one. Sessions of the same time add up,
-// because log odds of independent evidence do. What an ended session has drawn may be out of date: where one that
-// goes on, or ended later, has seen the same cell, it counts up to a limit only, so that what was moved meanwhile goes
-// after a few looks. Where none of these has seen the cell, it stays as it is. Stateless, thread-safe.
+// How the grids that several sessions have drawn of the same place become one. Where nothing is known of when each of
+// them looked there, sessions of the same time add up, because log odds of independent evidence do. Older evidence may
+// be out of date: where a session has seen the same cell later, it counts up to a limit only, so that what was moved
+// meanwhile goes after a few looks. Where none has, it stays as it is. Stateless, thread-safe.
 #pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 
 #include "server/slam/grid/occupancy_grid.h"
 
 namespace cairn::server {
 
-// Adds the cells of a later grid to a sum. Where both have seen a cell, the sum is first limited to +-`most`, in units
-// of GridChunk::log_odds.
-void AddLater(slam::GridChunk& sum, const slam::GridChunk& later, int most);
+inline constexpr int kLargestSum = 32000;  // In units of GridChunk::log_odds.
+
+inline bool EveryCell(std::size_t /*cell*/) {
+  return true;
+}
+
+// Adds to a sum those cells of a later grid for which `takes(cell)` is true. Where both have seen a cell, the sum is
+// first limited to +-`most`, in units of GridChunk::log_odds.
+template <typename Takes = decltype(EveryCell)>
+void AddLater(slam::GridChunk& sum, const slam::GridChunk& later, int most, const Takes& takes = EveryCell) {
+  for (std::size_t i = 0; i < sum.log_odds.size(); ++i) {
+    const int a = sum.log_odds[i], b = later.log_odds[i];
+    if (b == slam::kUnseen || !takes(i)) continue;
+    const int both = std::clamp(a, -most, most) + b;
+    sum.log_odds[i] = static_cast<std::int16_t>(a == slam::kUnseen ? b : std::clamp(both, -kLargestSum, kLargestSum));
+  }
+}
 
 // The same for evidence of one time.
-void AddBeside(slam::GridChunk& sum, const slam::GridChunk& other);
+template <typename Takes = decltype(EveryCell)>
+void AddBeside(slam::GridChunk& sum, const slam::GridChunk& other, const Takes& takes = EveryCell) {
+  AddLater(sum, other, kLargestSum, takes);
+}
 
 [[nodiscard]] slam::GridChunk UnseenChunk();
 

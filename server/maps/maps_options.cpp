@@ -13,8 +13,9 @@ void Visit(OptionVisitor& visitor, MapsOptions& options) {
                   "that is neither published nor enabled is forgotten. Each one takes memory for the "
                   "parts in which it differs from the present map.");
   visitor.Real("past_probability", options.past_probability, "", 0.51, 0.999,
-               "Largest probability that sessions which have ended give a cell that a later session has seen as well. "
-               "Nearer to 1, what was moved between two runs stays in the map for longer.");
+               "Largest probability that older evidence gives a cell that another session has seen later: that of "
+               "sessions which have ended, and of robots that have not looked there since. Nearer to 1, what was "
+               "moved stays in the map for longer.");
   visitor.Integer("max_edits", options.max_edits, "", 0, 4096,
                   "Edits by people (cairn map edit) that each site may have at one time. Further ones are refused.");
   visitor.Real(

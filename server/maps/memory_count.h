@@ -14,6 +14,8 @@ class MemoryCount {
   void Add(const std::shared_ptr<T>& shared, std::size_t bytes) {
     if (shared != nullptr && seen_.insert(shared.get()).second) bytes_ += bytes;
   }
+  // Of what is not shared.
+  void Add(std::size_t bytes) { bytes_ += bytes; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:

@@ -57,6 +57,8 @@ struct GridChange {
   SessionId session = 0;
   slam::OccupancyGrid::Change chunks;
   DrawnPath drawn{};  // Of the keyframes that are drawn, where they lie after the change.
+  // The cells at which the robot has looked since the change before. Cells that were drawn again are not among them.
+  slam::OccupancyGrid::Looks looks{};
 };
 
 // A session's answer to a correction: its previous grid, and the change to the grid with which it continues.

@@ -58,6 +58,7 @@ void Site::Change(GridChange&& change) {
 void Site::Merge(GridChange&& change, Changes& into) {
   Drawing& newest = into[change.session];
   for (auto& [key, chunk] : change.chunks) newest.chunks.insert_or_assign(key, std::move(chunk));
+  for (const auto& [key, cells] : change.looks) newest.looks[key] |= cells;
   if (change.drawn.path != nullptr) newest.drawn = std::move(change.drawn);
 }
 
@@ -73,7 +74,7 @@ void Site::Apply(SessionId session, const Drawing& drawing) {
       return;
     }
   }
-  joint_.Apply({.session = session, .chunks = {drawing.chunks.begin(), drawing.chunks.end()}});
+  joint_.Apply({.session = session, .chunks = {drawing.chunks.begin(), drawing.chunks.end()}, .looks = drawing.looks});
   FollowPaths({{session, drawing.drawn}});
 }
 

@@ -190,7 +190,8 @@ class Site : public std::enable_shared_from_this<Site> {
   class Ticket;
   struct Drawing {
     slam::OccupancyGrid::Chunks chunks;  // A null chunk: removed.
-    DrawnPath drawn;                     // The newest.
+    slam::OccupancyGrid::Looks looks;
+    DrawnPath drawn;  // The newest.
   };
   using Changes = std::map<SessionId, Drawing>;
 

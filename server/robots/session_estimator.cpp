@@ -174,7 +174,9 @@ void SessionEstimator::Dropped(const Scan& scan, DropReason reason) {
 }
 
 GridChange SessionEstimator::TakeGridChange() {
-  return {.session = identity_.id, .chunks = pipeline_.mapper().TakeGridChange(), .drawn = Drawn()};
+  slam::Mapper& mapper = pipeline_.mapper();
+  return {
+      .session = identity_.id, .chunks = mapper.TakeGridChange(), .drawn = Drawn(), .looks = mapper.TakeGridLooks()};
 }
 
 DrawnPath SessionEstimator::Drawn() const {

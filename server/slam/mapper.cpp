@@ -247,6 +247,10 @@ OccupancyGrid::Change Mapper::TakeGridChange() {
   return state_->drawing.TakeChange();
 }
 
+OccupancyGrid::Looks Mapper::TakeGridLooks() {
+  return state_->drawing.TakeLooks();
+}
+
 std::vector<Landmark> Mapper::landmarks() const {
   return state_->filter->landmarks();
 }

@@ -78,9 +78,11 @@ class Mapper {
   [[nodiscard]] bool full() const;
 
   [[nodiscard]] const OccupancyGrid& grid() const;
-  // The whole grid, and its changes since the last call (occupancy_grid.h: Share, TakeChange).
+  // The whole grid, its changes since the last call, and the cells that keyframes have touched since then
+  // (occupancy_grid.h: Share, TakeChange, TakeLooks).
   [[nodiscard]] OccupancyGrid::Chunks ShareGrid();
   [[nodiscard]] OccupancyGrid::Change TakeGridChange();
+  [[nodiscard]] OccupancyGrid::Looks TakeGridLooks();
   [[nodiscard]] std::vector<Landmark> landmarks() const;  // The landmarks of the best hypothesis.
   // The poses of all hypotheses of the filter, with weights, where its estimate is `T_map_robot`. Only for a robot that
   // is localized in the map that it draws.

@@ -20,7 +20,7 @@ namespace cairn::slam {
 
 class MapDrawing {
  public:
-  explicit MapDrawing(const GridOptions& options) : grid_(options) {}
+  explicit MapDrawing(const GridOptions& options) : grid_(options) { grid_.NoteLooks(); }
 
   // Draws the next keyframe at this pose.
   void Add(const Keyframe& keyframe, const Pose2& T_map_robot);
@@ -49,6 +49,7 @@ class MapDrawing {
   [[nodiscard]] const OccupancyGrid& grid() const { return grid_; }
   [[nodiscard]] OccupancyGrid::Chunks Share() { return grid_.Share(); }
   [[nodiscard]] OccupancyGrid::Change TakeChange() { return grid_.TakeChange(); }
+  [[nodiscard]] OccupancyGrid::Looks TakeLooks() { return grid_.TakeLooks(); }
   // T_map_robot of every keyframe in the drawing.
   [[nodiscard]] const std::vector<Pose2>& path() const { return path_; }
 

@@ -86,17 +86,27 @@ void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot, const Wants
   const RasterOptions raster{options_.resolution_m, options_.max_ray_m, options_.no_return_free_m,
                              options_.model == GridModel::kTriangular ? options_.hit_spread_m : 0.0};
   // A scan touches few chunks, but goes from one to the next in every row of cells.
-  std::vector<std::pair<int, GridChunk*>> chunks;  // Those of one row of chunks, by their x; null: not wanted.
+  struct Place {
+    int x;
+    GridChunk* chunk;  // Null: not wanted.
+    CellMask* looks;   // Null: not noted.
+  };
+  std::vector<Place> places;  // The chunks of one row of chunks.
   int row = std::numeric_limits<int>::min();
   static_assert(kTileCells % ScanRaster::kPiece == 0);  // A piece lies in one chunk.
   raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell first, const ScanRaster::Piece& marks) {
     const ChunkKey key = ChunkOf(first);
-    if (key.y != row) chunks.clear();
+    if (key.y != row) places.clear();
     row = key.y;
-    auto chunk = std::ranges::find(chunks, key.x, &std::pair<int, GridChunk*>::first);
-    if (chunk == chunks.end()) chunk = chunks.insert(chunk, {key.x, !wants || wants(key) ? &Writable(key) : nullptr});
-    if (chunk->second == nullptr) return;
-    std::int16_t* cells = chunk->second->log_odds.data() + IndexInChunk(first, key);
+    auto place = std::ranges::find(places, key.x, &Place::x);
+    if (place == places.end()) {
+      GridChunk* const chunk = !wants || wants(key) ? &Writable(key) : nullptr;
+      place = places.insert(place, {key.x, chunk, chunk != nullptr && notes_looks_ ? &looks_[key] : nullptr});
+    }
+    if (place->chunk == nullptr) return;
+    const std::size_t index = IndexInChunk(first, key);
+    if (place->looks != nullptr) place->looks->AddTouched(index, marks);
+    std::int16_t* cells = place->chunk->log_odds.data() + index;
     if (adds_up_) return AddUp(marks, cells);
     for (std::size_t i = 0; i < marks.size(); ++i)
       if (marks[i] != ScanRaster::kUntouched) cells[i] = After(cells[i], ScanRaster::HitShare(marks[i]));
@@ -124,6 +134,7 @@ std::int16_t OccupancyGrid::After(std::int16_t before, double hit) const {
 }
 
 void OccupancyGrid::ReplaceBy(OccupancyGrid&& other) {
+  looks_.clear();
   for (const auto& [key, slot] : slots_) changed_.insert(key);
   slots_ = std::move(other.slots_);
   for (const auto& [key, slot] : slots_) changed_.insert(key);

@@ -19,6 +19,7 @@
 #include "common/map/tile.h"
 #include "common/options/option_visitor.h"
 #include "common/sensor/scan.h"
+#include "server/slam/grid/cell_mask.h"
 #include "server/slam/grid/scan_raster.h"
 
 namespace cairn::slam {
@@ -97,6 +98,8 @@ class OccupancyGrid {
   using Chunks = std::map<ChunkKey, SharedChunk>;
   // The chunks that changed, as they are now; null if the grid no longer has the chunk.
   using Change = std::vector<std::pair<ChunkKey, SharedChunk>>;
+  // The cells that scans have passed or hit, by chunk.
+  using Looks = std::map<ChunkKey, CellMask>;
 
   explicit OccupancyGrid(const GridOptions& options);
   // Starts with the chunks that another grid with the same options has shared.
@@ -118,6 +121,11 @@ class OccupancyGrid {
   [[nodiscard]] Chunks Share();
   // The chunks that changed since the last call, in key order. They never change either.
   [[nodiscard]] Change TakeChange();
+  // From now on Draw notes the cells that it touches. A cell can be looked at without a change, when it holds the
+  // largest log odds already.
+  void NoteLooks() { notes_looks_ = true; }
+  // The cells touched since the last call, or since ReplaceBy, which forgets them: they lay in the old chunks.
+  [[nodiscard]] Looks TakeLooks() { return std::exchange(looks_, {}); }
 
   // Calls visit(key, chunk) for every chunk, in key order.
   template <typename Visit>
@@ -170,6 +178,8 @@ class OccupancyGrid {
   bool adds_up_ = true;  // Whether a cell adds whole hits and misses, and nothing else.
   std::map<ChunkKey, Slot> slots_;
   std::set<ChunkKey> changed_;
+  bool notes_looks_ = false;
+  Looks looks_;  // Not part of checkpoints: after a restart the whole grid is reported.
   ScanRaster raster_;
 };
 

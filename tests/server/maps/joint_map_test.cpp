@@ -30,12 +30,76 @@ TEST(JointMap, EvidenceOfSeveralRobotsAdds) {
   EXPECT_EQ(cells[2], kUnknownCell);
 }
 
-TEST(JointMap, ContraryEvidenceCancels) {
+TEST(JointMap, ContraryEvidenceCancelsWhereNobodyKnowsWhoLookedLast) {
   JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(200)}}});
   map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(-200)}}});
   map.Render();
   EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], 50);
+}
+
+slam::CellMask MaskOf(std::initializer_list<std::size_t> cells) {
+  slam::CellMask mask;
+  for (const std::size_t cell : cells) {
+    slam::ScanRaster::Piece marks{};
+    marks[cell % marks.size()] = slam::ScanRaster::kHit;
+    mask.AddTouched(cell - cell % marks.size(), marks);
+  }
+  return mask;
+}
+
+// Two robots have mapped for hours. One of them sees that a pallet is gone, and later the other one that it is back.
+TEST(JointMap, OfTwoRobotsThatGoOnTheOneThatLookedLastIsBelieved) {
+  const std::int16_t wall = 389, miss = slam::LogOddsOf(slam::GridOptions{}.miss_probability);
+  JointMap map(kPast);
+  const auto looks = [&map](SessionId session, std::int16_t log_odds, std::initializer_list<std::size_t> cells) {
+    map.Apply({.session = session, .chunks = {{{0, 0}, ChunkOf(log_odds)}}, .looks = {{{0, 0}, MaskOf(cells)}}});
+    map.Render();
+  };
+  const auto cell = [&map](std::size_t index) { return (*map.cells().at({0, 0, 0}))[index]; };
+  looks(1, wall, {0, 20});
+  looks(2, wall, {0, 20});
+  looks(2, static_cast<std::int16_t>(6 * miss), {0});
+  EXPECT_LT(cell(0), 50);
+  looks(2, -wall, {0});
+  EXPECT_LT(cell(0), 10);
+  EXPECT_EQ(cell(20), 8) << "the second was the last to look here as well";
+  EXPECT_EQ(cell(40), 50) << "nobody is known to have looked here last";
+  looks(1, wall, {0});  // Its cell has not changed, because it held the most before.
+  EXPECT_GT(cell(0), 90);
+  map.SetPast(1);
+  map.Render();
+  EXPECT_GT(cell(0), 90) << "it has ended, and has still looked last";
+  EXPECT_EQ(cell(20), 8);
+  map.SetPast(2);
+  map.MergePast(1, 2);
+  map.Remove(2);
+  map.Render();
+  EXPECT_TRUE(map.cells().empty());
+}
+
+// What a session with a frame of its own has looked at is somewhere else, and so is what was drawn again.
+TEST(JointMap, LooksOfAHiddenSessionDoNotCount) {
+  JointMap map(kPast);
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(300)}}});
+  map.SetHidden(2, true);
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(-300)}}, .looks = {{{0, 0}, MaskOf({0})}}});
+  map.SetHidden(2, false);
+  map.Render();
+  EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], 50);
+}
+
+TEST(LastLooks, TheLastOfMoreSessionsThanAByteCountsIsKnown) {
+  LastLooks last;
+  for (SessionId session = 1; session <= 300; ++session) last.Note(session, MaskOf({session}));
+  EXPECT_EQ(last.NumberOf(1), 0) << "the first ones are forgotten";
+  EXPECT_EQ(last.numbers()[1], 0);
+  EXPECT_EQ(last.numbers()[300], last.NumberOf(300));
+  EXPECT_NE(last.NumberOf(300), 0);
+  EXPECT_EQ(last.numbers()[200], last.NumberOf(200));
+  last.Replace(300, 200);
+  EXPECT_EQ(last.NumberOf(300), 0);
+  EXPECT_EQ(last.numbers()[300], last.NumberOf(200));
 }
 
 // Two ended sessions have often seen a wall. A robot of today has seen six times that it is not there.
