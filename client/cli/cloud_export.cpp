@@ -7,6 +7,7 @@
 #include "client/cli/option_checks.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/bag/recording.h"
+#include "common/sensor/log_options.h"
 
 namespace cairn::client {
 namespace {
@@ -90,6 +91,7 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
       ->check(Positive())
       ->type_name("SECONDS")
       ->capture_default_str();
+  AddLogOptions(*command, options.reader);
   command->add_flag("--tilted-only", options.cloud.tilted_only, "Leave out level scans");
   command->add_flag("--text", options.text, "Write numbers as text instead of binary");
   command->add_option("--truth-world", options.truth_world, "Also measure the cloud against this world in space");

@@ -20,13 +20,18 @@ std::uint64_t CubeOf(const Eigen::Vector3f& p, double voxel_m) {
 }  // namespace
 
 void AppendPoints(const Scan& scan, const ScanPlacing& placing, double max_range_m, PointCloud* cloud) {
-  const Pose2 T_map_laser = placing.T_map_robot * scan.T_robot_laser;
-  const Eigen::Matrix2d R = T_map_laser.rotation();
+  Pose2 T_map_laser = placing.T_map_robot * scan.T_robot_laser;
+  Eigen::Matrix2d R = T_map_laser.rotation();
   const double cos_tilt = std::cos(scan.tilt_rad), sin_tilt = std::sin(scan.tilt_rad);
   for (std::size_t i = 0; i < scan.ranges_m.size(); ++i) {
     if (ClassifyRange(scan.ranges_m[i], scan.range_min_m, scan.range_max_m) != BeamClass::kHit) continue;
     const double range = scan.ranges_m[i];
     if (range > max_range_m) continue;
+    if (placing.T_map_robot_last) {
+      const double share = static_cast<double>(i) / static_cast<double>(scan.ranges_m.size() - 1);
+      T_map_laser = Interpolate(placing.T_map_robot, *placing.T_map_robot_last, share) * scan.T_robot_laser;
+      R = T_map_laser.rotation();
+    }
     const double bearing = scan.angle_first_rad + static_cast<double>(i) * scan.angle_step_rad;
     const double x = range * std::cos(bearing), y = range * std::sin(bearing);
     const Eigen::Vector2d p = T_map_laser.translation() + R * Eigen::Vector2d(x * cos_tilt, y);
@@ -63,7 +68,11 @@ Result<void> CloudBuilder::Add(const Scan& scan) {
   ++used_;
   tilted_ += scan.tilt_rad != 0.0;
   const std::size_t first = cloud_.size();
-  AppendPoints(scan, {*T_map_robot, options_.height_m}, options_.max_range_m, &cloud_);
+  ScanPlacing placing{*T_map_robot, options_.height_m};
+  const double duration_s = scan.beam_period_s * static_cast<double>(scan.ranges_m.size() - 1);
+  if (duration_s > 0.0)
+    placing.T_map_robot_last = PoseOn(path_, scan.stamp + StampFromSeconds(duration_s), options_.max_pose_gap_s);
+  AppendPoints(scan, placing, options_.max_range_m, &cloud_);
   if (options_.voxel_m > 0.0) Thin(first);
   if (cloud_.size() > options_.max_points)
     return Fail(StatusCode::kResourceExhausted,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <unordered_set>
 
 #include "common/cloud/point_cloud.h"
@@ -14,23 +15,27 @@
 namespace cairn {
 
 // The hits of a scan as points in space: the scan plane, turned about the laser's y axis by the tilt, placed where the
-// robot stood on a flat floor. Where the scan was swept while the robot moved, the pose is that of its first beam: a
-// robot halts for a tilted scan. Stateless, thread-safe. REQUIRES a scan that passed ValidateScan. Source: thesis
+// robot stood on a flat floor. Where the scan was swept while the robot moved, each beam is placed at the pose between
+// those of the first and the last one. Stateless, thread-safe. REQUIRES a scan that passed ValidateScan. Source: thesis
 // C 3.3, 5.4 (points of space from poses of the plane); (r, alpha, beta) of 4.3.2.
 struct ScanPlacing {
-  Pose2 T_map_robot;
+  Pose2 T_map_robot;      // At the first beam.
   double height_m = 0.0;  // Height of the laser's tilt axis above the floor.
+  std::optional<Pose2>
+      T_map_robot_last{};  // At the last beam; nothing if the robot stood, or all beams are of one time.
 };
 
 // Appends one point per hit within `max_range_m`, in the order of the beams.
 void AppendPoints(const Scan& scan, const ScanPlacing& placing, double max_range_m, PointCloud* cloud);
 
 struct CloudOptions {
-  double height_m = 0.0;        // Height of the scanner above the floor.
-  double max_range_m = 1e4;     // Farther hits are left out.
-  double voxel_m = 0.0;         // 0: every point is kept.
-  double max_pose_gap_s = 1.0;  // Longest time between the two poses around a scan; with more, the scan is left out.
-  bool tilted_only = false;     // Leave out level scans.
+  double height_m = 0.0;     // Height of the scanner above the floor.
+  double max_range_m = 1e4;  // Farther hits are left out.
+  double voxel_m = 0.0;      // 0: every point is kept.
+  // Longest time between the two poses around a scan; with more, the scan is left out. Where the path has no pose at
+  // the last beam of a scan, all its beams are placed at that of the first.
+  double max_pose_gap_s = 1.0;
+  bool tilted_only = false;              // Leave out level scans.
   std::size_t max_points = 100'000'000;  // 1.2 GB.
 };
 [[nodiscard]] Result<void> Validate(const CloudOptions& options);

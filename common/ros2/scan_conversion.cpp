@@ -34,11 +34,15 @@ Scan ScanOf(LaserScan&& message, const Mounting& mounting) {
   scan.T_robot_laser = mounting.T_robot_laser;
   scan.beam_period_s = message.time_increment;
   const auto gaps = static_cast<double>(std::max<std::size_t>(message.ranges.size(), 2) - 1);
-  if (message.scan_time > 0.0) scan.beam_period_s = std::min(scan.beam_period_s, message.scan_time / gaps);
+  if (message.scan_time > 0.0) {
+    const double longest_s = message.scan_time / gaps;
+    scan.beam_period_s = std::clamp(scan.beam_period_s, -longest_s, longest_s);
+  }
   scan.ranges_m = std::move(message.ranges);
   for (float& range : scan.ranges_m) {
     if (std::isfinite(range) && range > scan.range_max_m) range = std::numeric_limits<float>::quiet_NaN();
   }
+  OrderByTime(scan);
   return scan;
 }
 

@@ -1,6 +1,8 @@
 #include "common/sensor/scan.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -63,6 +65,19 @@ Validity ValidateScan(const Scan& scan) {
     if (ClassifyRange(range, scan.range_min_m, scan.range_max_m) != BeamClass::kInvalid) return {};
   }
   return Refuse(ScanFault::kEmpty, "no beam has a usable range");
+}
+
+void OrderByTime(Scan& scan) {
+  if (!(scan.beam_period_s < 0.0) || scan.ranges_m.empty()) return;
+  const double gaps = static_cast<double>(scan.ranges_m.size() - 1), duration_s = -scan.beam_period_s * gaps;
+  if (!(duration_s <= kMaxDuration)) return;
+  const Stamp duration = StampFromSeconds(duration_s);
+  if (scan.stamp < std::numeric_limits<Stamp>::min() + duration) return;
+  scan.stamp -= duration;
+  scan.angle_first_rad += gaps * scan.angle_step_rad;
+  scan.angle_step_rad = -scan.angle_step_rad;
+  scan.beam_period_s = -scan.beam_period_s;
+  std::ranges::reverse(scan.ranges_m);
 }
 
 }  // namespace cairn

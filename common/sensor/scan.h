@@ -22,7 +22,7 @@ struct Scan {
   double angle_step_rad = 0.0;   // Between beams; negative for a scanner that turns clockwise.
   double range_min_m = 0.0;      // Shorter ranges are not measurements.
   double range_max_m = 0.0;      // Ranges at or above it mean "nothing hit" up to there.
-  double beam_period_s = 0.0;    // Between beams; 0 if the whole scan is taken at once.
+  double beam_period_s = 0.0;    // Between beams; 0 if the whole scan is taken at once. See OrderByTime.
   double tilt_rad = 0.0;         // Turn of the scan plane about the laser's y axis: positive looks down.
   Pose2 T_robot_laser;
   std::vector<float> ranges_m;  // NaN, negative, zero, infinite allowed: see BeamClass.
@@ -49,5 +49,11 @@ struct ScanRefusal {
 // finite non-negative beam period and at most 10 s from the first beam to the last; at least one beam that is not
 // kInvalid. Single bad ranges are normal and stay (kInvalid).
 [[nodiscard]] tl::expected<void, ScanRefusal> ValidateScan(const Scan& scan);
+
+// Many drivers list the beams of a lidar in the other order than it measures them. They say so by a negative beam
+// period: beam i was measured at stamp + i * beam_period_s, so the first one last. Lists such beams in the order of
+// their times: every beam keeps its direction, range and time, and the period becomes positive. Other scans stay as
+// they are, and so do those with times that ValidateScan refuses.
+void OrderByTime(Scan& scan);
 
 }  // namespace cairn

@@ -37,6 +37,7 @@ ScanSample FromWire(v1::Scan&& wire) {
   scan.tilt_rad = wire.tilt_rad();
   scan.T_robot_laser = FromWire(wire.T_robot_laser());
   scan.ranges_m = std::move(wire.ranges_m());
+  OrderByTime(scan);
   return value;
 }
 

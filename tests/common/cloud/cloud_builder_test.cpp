@@ -44,6 +44,23 @@ TEST(ScanPoints3, MountingAndPosePlaceThePlane) {
   ExpectPoint(cloud[2], -1.0, 2.5, 0.4);
 }
 
+// The robot turns by 90 deg while the beams are measured one after the other.
+TEST(CloudBuilder, EachBeamIsPlacedWhereTheRobotWasAtItsTime) {
+  const Trajectory turn = {{0, {0, 0, 0}}, {kNanosPerSecond, {0, 0, kPi / 2}}};
+  Scan scan = Beams({2, 2, 2}, 0.0);
+  scan.beam_period_s = 0.5;
+  CloudBuilder builder(turn, {.max_pose_gap_s = 2.0});
+  ASSERT_TRUE(builder.Add(scan));
+  ASSERT_EQ(builder.cloud().size(), 3U);
+  ExpectPoint(builder.cloud()[0], 0, -2, 0);
+  ExpectPoint(builder.cloud()[1], std::sqrt(2.0), std::sqrt(2.0), 0);
+  ExpectPoint(builder.cloud()[2], -2, 0, 0);
+  scan.stamp = kNanosPerSecond;  // The path ends during the scan.
+  ASSERT_TRUE(builder.Add(scan));
+  ASSERT_EQ(builder.cloud().size(), 6U);
+  ExpectPoint(builder.cloud()[5], -2, 0, 0);
+}
+
 TEST(ScanPoints3, OnlyHitsInRangeBecomePoints) {
   PointCloud cloud;
   AppendPoints(Beams({INFINITY, NAN, 0.0F}, 0.1), {}, 100.0, &cloud);

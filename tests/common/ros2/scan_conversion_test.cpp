@@ -78,6 +78,18 @@ TEST(ScanConversion, TheTimesAreThoseOfTheMessage) {
   EXPECT_EQ(ScanOf(LaserScan(message), {}).beam_period_s, 0.0);
 }
 
+TEST(ScanConversion, RaysThatAreListedLastFirstAreOrderedByTheirTimes) {
+  LaserScan message = Message();
+  message.time_increment = -0.01;
+  message.scan_time = 0.02;  // As above: it bounds the time between two rays.
+  const Scan scan = ScanOf(LaserScan(message), {});
+  ASSERT_EQ(scan.ranges_m.size(), message.ranges.size());
+  EXPECT_DOUBLE_EQ(scan.beam_period_s, 0.005);
+  EXPECT_EQ(scan.stamp, 5 * kNanosPerSecond - kNanosPerSecond / 50);
+  EXPECT_EQ(scan.ranges_m.back(), message.ranges.front());
+  EXPECT_NEAR(scan.angle_step_rad, -message.angle_increment, 1e-9);
+}
+
 // REP 117, and the comment of LaserScan.msg on values outside of range_min and range_max.
 TEST(ScanConversion, RangesMeanWhatRosMeans) {
   LaserScan message = Message();

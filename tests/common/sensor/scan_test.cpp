@@ -86,6 +86,41 @@ TEST_P(FaultyScan, IsRefusedWithItsReason) {
   EXPECT_THAT(result.error().message, testing::HasSubstr(GetParam().reason));
 }
 
+TEST(Scan, BeamsThatAreListedLastFirstAreOrderedByTheirTimes) {
+  Scan listed;
+  listed.stamp = 2 * kNanosPerSecond;
+  listed.angle_first_rad = -1.0;
+  listed.angle_step_rad = 0.5;
+  listed.beam_period_s = -0.25;
+  listed.ranges_m = {1.0F, 2.0F, 3.0F};
+  Scan ordered = listed;
+  OrderByTime(ordered);
+  EXPECT_EQ(ordered.beam_period_s, 0.25);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double listed_i = static_cast<double>(i), ordered_i = static_cast<double>(2 - i);
+    EXPECT_EQ(ordered.ranges_m[2 - i], listed.ranges_m[i]);
+    EXPECT_DOUBLE_EQ(ordered.angle_first_rad + ordered_i * ordered.angle_step_rad,
+                     listed.angle_first_rad + listed_i * listed.angle_step_rad);
+    EXPECT_DOUBLE_EQ(SecondsFromStamp(ordered.stamp) + ordered_i * ordered.beam_period_s,
+                     SecondsFromStamp(listed.stamp) + listed_i * listed.beam_period_s);
+  }
+  const auto stays = [](const Scan& scan) {
+    Scan again = scan;
+    OrderByTime(again);
+    return again.stamp == scan.stamp && again.angle_step_rad == scan.angle_step_rad && again.ranges_m == scan.ranges_m;
+  };
+  EXPECT_TRUE(stays(ordered));
+  listed.stamp = std::numeric_limits<Stamp>::min();
+  EXPECT_TRUE(stays(listed)) << "no stamp is so early";
+  listed.stamp = 100 * kNanosPerSecond;
+  listed.beam_period_s = -6.0;
+  EXPECT_TRUE(stays(listed)) << "too long, to be refused";
+  listed.beam_period_s = -std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(stays(listed));
+  listed.ranges_m.clear();
+  EXPECT_TRUE(stays(listed));
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Faults, FaultyScan,
     testing::Values(Fault{"NoBeams", [](Scan& s) { s.ranges_m.clear(); }, "no beams", ScanFault::kEmpty},
