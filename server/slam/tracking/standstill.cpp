@@ -18,6 +18,9 @@ constexpr double kShare = 1.0 / 3.0, kVarianceShare = kShare / (2.0 - kShare);
 // So many standard deviations are beyond what a robot that stands shows in a day, also with tails that are a little
 // heavier than those of the normal distribution.
 constexpr double kMovedSigmas = 7.0;
+// A single match that is farther off counts at once: somebody carries the robot. One that is nearer may be a match at a
+// wrong place, as a cheap lidar has one in some ten thousand; two that agree are needed.
+constexpr double kFarM = 0.1, kFarRad = 0.05;
 // How fast the noise is learned, and how much larger than told it can be, as variances. Points of one surface share
 // errors of its direction, which no scan shows by itself.
 constexpr double kLearningShare = 0.01, kMostTold = 4.0;
@@ -27,6 +30,10 @@ constexpr double kLeastM = 5e-4, kLeastRad = 2e-4;
 // Mean of the squares of the normalised numbers: 1 if the covariance is right.
 double MeanSquare(const Eigen::Vector3d& difference, const Eigen::Matrix3d& covariance) {
   return difference.dot(covariance.ldlt().solve(difference)) / 3.0;
+}
+
+bool IsFar(const Eigen::Vector3d& innovation) {
+  return innovation.head<2>().norm() > kFarM || std::abs(innovation.z()) > kFarRad;
 }
 
 }  // namespace
@@ -46,7 +53,9 @@ std::optional<Pose2> Standstill::Take(const Pose2& T_odom_robot, const MatchResu
   if (stands && !match.converged) return at_start_ ? begin_ : mean_;  // The scan says nothing.
   Eigen::Matrix3d noise = match.shown_covariance;
   noise.diagonal() += Eigen::Vector3d(kLeastM * kLeastM, kLeastM * kLeastM, kLeastRad * kLeastRad);
-  if (!stands || !known || HasMoved(Minus(match.T_ref_curr, mean_), noise)) {
+  const Eigen::Vector3d innovation = Minus(match.T_ref_curr, mean_);
+  const Verdict verdict = stands && known ? Judge(innovation, noise) : Verdict::kMoved;
+  if (verdict == Verdict::kMoved) {
     at_start_ = false;
     recent_.setZero();
     T_odom_begin_ = T_odom_robot;
@@ -54,19 +63,22 @@ std::optional<Pose2> Standstill::Take(const Pose2& T_odom_robot, const MatchResu
     matches_ = known ? 1.0 : 0.0;
     return std::nullopt;
   }
-  matches_ = std::min(matches_ + 1.0, kMostMatches);
-  mean_ = Plus(mean_, Minus(match.T_ref_curr, mean_) / matches_);
+  if (verdict == Verdict::kStands) {
+    matches_ = std::min(matches_ + 1.0, kMostMatches);
+    mean_ = Plus(mean_, innovation / matches_);
+  }
   return at_start_ ? begin_ : mean_;
 }
 
-bool Standstill::HasMoved(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& noise) {
-  recent_ += kShare * (innovation - recent_);
+Standstill::Verdict Standstill::Judge(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& noise) {
   const double newest = MeanSquare(innovation, (1.0 + 1.0 / matches_) * noise);
-  const double last = MeanSquare(recent_, (kVarianceShare + 1.0 / matches_) * noise);
   const double limit = kMovedSigmas * kMovedSigmas / 3.0 * noise_;
-  if (newest > limit || last > limit) return true;
+  if (newest > limit && IsFar(innovation)) return Verdict::kMoved;
+  recent_ += kShare * (std::min(1.0, std::sqrt(limit / newest)) * innovation - recent_);
+  if (MeanSquare(recent_, (kVarianceShare + 1.0 / matches_) * noise) > limit) return Verdict::kMoved;
+  if (newest > limit) return Verdict::kDoubtful;
   noise_ = std::clamp(noise_ + kLearningShare * (newest - noise_), 1.0, kMostTold);
-  return false;
+  return Verdict::kStands;
 }
 
 void Standstill::MoveTo(const Pose2& T_new_old) {

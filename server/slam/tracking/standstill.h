@@ -3,13 +3,15 @@
 // contradict, it is told to be at the mean of the matches since it stopped. The noise of a match is the one that its
 // points show. Before the first motion it is at the start, which has no error.
 // Odometry can be wrong: wheels freeze or slip, somebody carries the robot. So the robot counts as moved, and is told
-// to be where the last match is, as soon as one match, or the last few together, differ from the mean by more than
-// their noise. The track itself is that of the matches: this changes only where the robot is told to be.
-// Frame: poses in `track`. Not thread-safe.
-// Source: the recursive mean; the moving average of the innovations is the chart of Roberts, Technometrics 1959.
+// to be where the last match is, as soon as the last few matches together differ from the mean by more than their
+// noise, or one does and is far away. A single match that is a few centimetres off is not enough: it may be wrong. The
+// track itself is that of the matches: this changes only where the robot is told to be. Frame: poses in `track`. Not
+// thread-safe. Source: the recursive mean; the moving average of the innovations is the chart of Roberts, Technometrics
+// 1959.
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 
 #include "common/geometry/pose2.h"
@@ -35,8 +37,12 @@ class Standstill {
   }
 
  private:
-  // Whether the match, or the last ones together, say that the robot has moved.
-  [[nodiscard]] bool HasMoved(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& noise);
+  enum class Verdict : std::uint8_t {
+    kStands = 0,
+    kDoubtful,  // This match alone says that the robot has moved a little.
+    kMoved,
+  };
+  [[nodiscard]] Verdict Judge(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& noise);
 
   double matches_ = 0.0;  // Since the robot stands; 0 if that is not known.
   bool at_start_ = false;

@@ -12,6 +12,7 @@
 #include "server/tools/calibrate/laser_run.h"
 #include "tests/server/tools/calibrate/handed_over_drive.h"
 #include "tests/studies/lowcost/mapped.h"
+#include "tests/studies/lowcost/standing.h"
 #include "tests/studies/sensitivity/map_crispness.h"
 
 namespace cairn::studies {
@@ -22,8 +23,6 @@ constexpr double kMostShareOfWay = 0.02;
 // The simulated drives, at whatever rate they are scanned. Over the seeds 1 to 3 it was 0.05 to 0.15 m; before
 // odometry's noise counted by distance, up to 1.3 m at 40 scans a second.
 constexpr double kMostErrorSmoothedM = 0.16;
-// A robot that stands for an hour is told to be no farther from where it is.
-constexpr double kMostWhileStandingM = 0.01;
 
 // Every k-th scan such that `share` of them stay.
 StudyLog Thinned(const StudyLog& log, double share) {
@@ -83,43 +82,6 @@ void RunRates(StudyContext& context) {
   if (auto furo = OpenRealLog(context, "lowcost/furo_lsc_corridor-degene", 0, {0.04, StampAt::kMiddle, true, kPi}))
     add(*furo, 25.0, {25.0, 12.5, 8.3, 5.0});
   report.Add(table, "rates");
-}
-
-void RunStanding(StudyContext& context) {
-  Report& report = context.report;
-  report.Heading("Standing for an hour");
-  auto world = sim::OpenWorld("room");
-  const sim::Surroundings surroundings = sim::SurroundingsOf(*std::move(world));
-  Table table({"lidar", "scans", "farthest (mm)", "at the end (mm)", "turned at the end (mrad)"});
-  for (const std::string model : {"rplidar-a1", "lds-01", "ld19"}) {
-    const sim::ModelledLaser lidar = *sim::WithModel({}, model);
-    const Pose2 T_map_robot = surroundings.routes.empty()
-                                  ? Pose2{}
-                                  : Pose2{surroundings.routes.front().waypoints_map.front().x(),
-                                          surroundings.routes.front().waypoints_map.front().y(), 0.3};
-    StudyLog log;
-    log.T_map_robot_start = T_map_robot;
-    sim::Random random(context.seed);
-    const double seconds = context.Pick(3600.0, 30.0);
-    for (int k = 0; k < static_cast<int>(seconds * lidar.scan_hz); ++k) {
-      const Stamp stamp = kNanosPerSecond + StampFromSeconds(k / lidar.scan_hz);
-      log.records.emplace_back(Odometry{0, stamp, {}});
-      log.records.emplace_back(
-          sim::MeasureScan(*surroundings.scene, {}, T_map_robot, {}, stamp, 0.0, lidar.laser, random));
-    }
-    slam::MapperOptions options;
-    options.seed = static_cast<std::int64_t>(context.seed);
-    const LogRun run = RunOverLog(log, options);
-    double farthest = 0.0;
-    for (const StampedPose& pose : run.online)
-      farthest = std::max(farthest, (pose.T_map_robot.translation() - T_map_robot.translation()).norm());
-    const Pose2 last = run.online.back().T_map_robot;
-    table.Add({model, Count(static_cast<long long>(run.online.size())), Number(1e3 * farthest, 1),
-               Number(1e3 * (last.translation() - T_map_robot.translation()).norm(), 1),
-               Number(1e3 * AngleDiff(last.theta, T_map_robot.theta), 1)});
-    report.Expect(farthest <= kMostWhileStandingM, model + ": a standing robot drifts by more than 1 cm");
-  }
-  report.Add(table, "standing");
 }
 
 void RunLidars(StudyContext& context) {

@@ -89,6 +89,21 @@ TEST(Standstill, ADrivingRobotIsWhereItsMatchesAre) {
   }
 }
 
+// A cheap lidar has one match in some ten thousand that is wrong by centimetres.
+TEST(Standstill, ASingleWrongMatchMovesNoRobotAndTwoThatAgreeDo) {
+  Matches matches;
+  Standstill standstill;
+  standstill.Begin({}, {});
+  const Pose2 stop{3.0, 1.0, -0.4}, wrong{3.0, 1.09, -0.4};
+  for (int scan = 0; scan < 200; ++scan) static_cast<void>(standstill.Take({3.0, 0.0, 0.0}, matches.At(stop)));
+  const std::optional<Pose2> held = standstill.Take({3.0, 0.0, 0.0}, matches.At(wrong));
+  ASSERT_TRUE(held);
+  EXPECT_LT(Away(*held, stop), 0.004);
+  for (int scan = 0; scan < 5; ++scan) ASSERT_TRUE(standstill.Take({3.0, 0.0, 0.0}, matches.At(stop))) << scan;
+  ASSERT_TRUE(standstill.Take({3.0, 0.0, 0.0}, matches.At(wrong)));
+  EXPECT_FALSE(standstill.Take({3.0, 0.0, 0.0}, matches.At(wrong)));
+}
+
 // Odometry freezes, or somebody pushes the robot: at once where a scan shows it, soon where several do.
 TEST(Standstill, FrozenOdometryHoldsNoRobotThatMoves) {
   for (const double step_m : {0.002, 0.005, 0.02, 0.3}) {
