@@ -9,15 +9,16 @@ namespace {
 // Keyframes drawn again with every scan, which takes a few milliseconds.
 constexpr std::size_t kRedrawnPerScan = 20;
 
-void DrawOnto(OccupancyGrid& grid, const Keyframe& keyframe, const Pose2& T_map_robot) {
-  if (keyframe.localized) grid.Draw(*keyframe.scan, T_map_robot);
+void DrawOnto(OccupancyGrid& grid, const Keyframe& keyframe, const Pose2& T_map_robot,
+              OccupancyGrid::Looks* looks = nullptr) {
+  if (keyframe.localized) grid.Draw(*keyframe.scan, T_map_robot, {}, looks);
 }
 
 }  // namespace
 
 void MapDrawing::Add(const Keyframe& keyframe, const Pose2& T_map_robot) {
   path_.push_back(T_map_robot);
-  DrawOnto(grid_, keyframe, T_map_robot);
+  DrawOnto(grid_, keyframe, T_map_robot, &looks_);
 }
 
 void MapDrawing::StartAgain(std::uint64_t made) {
@@ -38,6 +39,7 @@ void MapDrawing::Continue(std::span<const Keyframe> keyframes, const PosePath& p
   for (std::size_t& k = redraw_->drawn; k < end; ++k) DrawOnto(redraw_->grid, keyframes[k], path[k]);
   if (redraw_->drawn < keyframes.size()) return;
   grid_.ReplaceBy(std::move(redraw_->grid));
+  looks_.clear();
   redraw_.reset();
   path_ = path.values();
   frozen_path_.Forget();
@@ -57,6 +59,7 @@ void MapDrawing::Adopt(OccupancyGrid grid, std::uint64_t made, std::size_t drawn
   const bool outdated = made < changed_at_ || (redraw_ && !along_path);
   redraw_.reset();
   grid_.ReplaceBy(std::move(grid));
+  looks_.clear();
   for (std::size_t k = drawn; k < keyframes.size(); ++k) DrawOnto(grid_, keyframes[k], path[k]);
   if (along_path) path_ = path.values();
   if (in_grid.size() == drawn && keyframes.size() == path_.size()) {

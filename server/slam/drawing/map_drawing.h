@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/slam/grid/occupancy_grid.h"
@@ -20,7 +21,7 @@ namespace cairn::slam {
 
 class MapDrawing {
  public:
-  explicit MapDrawing(const GridOptions& options) : grid_(options) { grid_.NoteLooks(); }
+  explicit MapDrawing(const GridOptions& options) : grid_(options) {}
 
   // Draws the next keyframe at this pose.
   void Add(const Keyframe& keyframe, const Pose2& T_map_robot);
@@ -49,7 +50,9 @@ class MapDrawing {
   [[nodiscard]] const OccupancyGrid& grid() const { return grid_; }
   [[nodiscard]] OccupancyGrid::Chunks Share() { return grid_.Share(); }
   [[nodiscard]] OccupancyGrid::Change TakeChange() { return grid_.TakeChange(); }
-  [[nodiscard]] OccupancyGrid::Looks TakeLooks() { return grid_.TakeLooks(); }
+  // The cells that Add has touched since the last call, or since the whole grid was replaced. What is drawn again is
+  // not looked at again.
+  [[nodiscard]] OccupancyGrid::Looks TakeLooks() { return std::exchange(looks_, {}); }
   // T_map_robot of every keyframe in the drawing.
   [[nodiscard]] const std::vector<Pose2>& path() const { return path_; }
 
@@ -72,6 +75,7 @@ class MapDrawing {
   };
 
   OccupancyGrid grid_;
+  OccupancyGrid::Looks looks_;  // Not part of checkpoints: after a restart the whole grid is reported.
   std::vector<Pose2> path_;
   FrozenBlocks<Pose2> frozen_path_;  // For checkpoints.
   std::optional<Redraw> redraw_;     // The new map, while it is being drawn after a change of the path.

@@ -82,7 +82,7 @@ OccupancyGrid::OccupancyGrid(const GridOptions& options, const Chunks& shared) :
   for (const auto& [key, chunk] : shared) slots_[key].shared = chunk;
 }
 
-void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot, const Wants& wants) {
+void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot, const Wants& wants, Looks* looks) {
   const RasterOptions raster{options_.resolution_m, options_.max_ray_m, options_.no_return_free_m,
                              options_.model == GridModel::kTriangular ? options_.hit_spread_m : 0.0};
   // A scan touches few chunks, but goes from one to the next in every row of cells.
@@ -101,7 +101,7 @@ void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot, const Wants
     auto place = std::ranges::find(places, key.x, &Place::x);
     if (place == places.end()) {
       GridChunk* const chunk = !wants || wants(key) ? &Writable(key) : nullptr;
-      place = places.insert(place, {key.x, chunk, chunk != nullptr && notes_looks_ ? &looks_[key] : nullptr});
+      place = places.insert(place, {key.x, chunk, chunk != nullptr && looks != nullptr ? &(*looks)[key] : nullptr});
     }
     if (place->chunk == nullptr) return;
     const std::size_t index = IndexInChunk(first, key);
@@ -134,7 +134,6 @@ std::int16_t OccupancyGrid::After(std::int16_t before, double hit) const {
 }
 
 void OccupancyGrid::ReplaceBy(OccupancyGrid&& other) {
-  looks_.clear();
   for (const auto& [key, slot] : slots_) changed_.insert(key);
   slots_ = std::move(other.slots_);
   for (const auto& [key, slot] : slots_) changed_.insert(key);

@@ -109,9 +109,10 @@ class OccupancyGrid {
 
   using Wants = std::function<bool(const ChunkKey& key)>;
   // Draws one scan taken at this pose. `wants`, if given, is asked once about every chunk in which the scan changes
-  // cells, and only those chunks change for which it says yes. REQUIRES: the scan passed ValidateScan, and the pose is
-  // finite.
-  void Draw(const Scan& scan, const Pose2& T_map_robot, const Wants& wants = {});
+  // cells, and only those chunks change for which it says yes. `looks`, if given, gets the cells that the scan touches
+  // there in addition: one that holds the largest log odds already is looked at without a change. REQUIRES: the scan
+  // passed ValidateScan, and the pose is finite.
+  void Draw(const Scan& scan, const Pose2& T_map_robot, const Wants& wants = {}, Looks* looks = nullptr);
   // Replaces all chunks by those of another grid with the same options. All chunks of both grids count as
   // changed.
   void ReplaceBy(OccupancyGrid&& other);
@@ -121,11 +122,6 @@ class OccupancyGrid {
   [[nodiscard]] Chunks Share();
   // The chunks that changed since the last call, in key order. They never change either.
   [[nodiscard]] Change TakeChange();
-  // From now on Draw notes the cells that it touches. A cell can be looked at without a change, when it holds the
-  // largest log odds already.
-  void NoteLooks() { notes_looks_ = true; }
-  // The cells touched since the last call, or since ReplaceBy, which forgets them: they lay in the old chunks.
-  [[nodiscard]] Looks TakeLooks() { return std::exchange(looks_, {}); }
 
   // Calls visit(key, chunk) for every chunk, in key order.
   template <typename Visit>
@@ -178,8 +174,6 @@ class OccupancyGrid {
   bool adds_up_ = true;  // Whether a cell adds whole hits and misses, and nothing else.
   std::map<ChunkKey, Slot> slots_;
   std::set<ChunkKey> changed_;
-  bool notes_looks_ = false;
-  Looks looks_;  // Not part of checkpoints: after a restart the whole grid is reported.
   ScanRaster raster_;
 };
 

@@ -37,6 +37,22 @@ std::size_t ChunksOfOne() {
   return grid.chunk_count();
 }
 
+// What is drawn again was not looked at again, and after a change of the path the looks before lay elsewhere.
+TEST(MapDrawing, OnlyNewKeyframesAreLooks) {
+  const std::vector<Keyframe> keyframes = Keyframes(kKeyframes);
+  const PosePath path = Path();
+  MapDrawing drawing{GridOptions{}};
+  for (std::size_t k = 0; k < kKeyframes; ++k) drawing.Add(keyframes[k], path[k]);
+  EXPECT_EQ(drawing.TakeLooks().size(), kKeyframes * ChunksOfOne());
+  EXPECT_TRUE(drawing.TakeLooks().empty());
+  drawing.Add(keyframes.back(), path[0]);
+  drawing.StartAgain(kKeyframes);
+  drawing.Finish(keyframes, path);
+  EXPECT_TRUE(drawing.TakeLooks().empty());
+  drawing.Adopt(OccupancyGrid(GridOptions{}), kKeyframes, 1, keyframes, path);
+  EXPECT_TRUE(drawing.TakeLooks().empty());
+}
+
 // What a retired keyframe has drawn stays.
 TEST(MapDrawing, KeepsWhatRetiredKeyframesHaveDrawn) {
   const std::vector<Keyframe> keyframes = Keyframes(kKeyframes);
