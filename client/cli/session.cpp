@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
@@ -19,7 +21,13 @@ ExitCode ShowStatus(Program& program, const std::string& robot) {
   nlohmann::json object = {
       {"robots", answer->robots}, {"degraded", answer->degraded}, {"refused", answer->refused}, {"load", answer->load}};
   if (robot.empty()) {
-    // An addition only: the status does not fail where this question does.
+    // Additions only: the status does not fail where these questions do.
+    const auto maps = program.Ask([](QueryClient& server) { return server.Maps(); });
+    if (maps) text += FormatMemoryNotes(*maps);
+    nlohmann::json notes = nlohmann::json::array();
+    for (const MapInfo& map : maps.value_or(std::vector<MapInfo>{}))
+      if (!map.memory_note.empty()) notes.push_back({{"site", map.site}, {"memory_note", map.memory_note}});
+    object["memory"] = std::move(notes);
     const auto ros2 = program.Ask([](QueryClient& server) { return server.Ros2(); });
     if (ros2) text += FormatRos2Door(*ros2);
     if (ros2 && ros2->door.enabled)
@@ -41,7 +49,8 @@ void AddStatus(CLI::App& app, Program& program) {
   command->footer(
       "The ledger says what became of every scan: received = used + dropped (by reason) + waiting.\n"
       "The last lines say how busy the server is and count what it refused because of its sender. The server's log\n"
-      "names the senders. Where ROS 2 robots are not on the map, a line says how many.\n"
+      "names the senders. Where a site has given something up to stay below maps.max_memory_mib, or ROS 2 robots are\n"
+      "not on the map, a line says so.\n"
       "EXAMPLES\n  cairn status\n  cairn status robot1 --json");
   auto robot = std::make_shared<std::string>();
   command->add_option("robot", *robot, "Only this robot");

@@ -138,6 +138,13 @@ std::string FormatRos2Door(const Ros2Report& report, std::size_t problems) {
                      problems == 0 ? "" : fmt::format(", {} problem{}", problems, problems == 1 ? "" : "s"));
 }
 
+std::string FormatMemoryNotes(std::span<const MapInfo> maps) {
+  std::string text;
+  for (const MapInfo& map : maps)
+    if (!map.memory_note.empty()) text += "memory of site " + map.site + ": " + map.memory_note + "\n";
+  return text;
+}
+
 std::string FormatMap(const MapInfo& map) {
   std::string text =
       fmt::format("{}: {} in {} of {} m, epoch {}, version {}, {}", map.site, Counted(map.tile_count, "tile"),

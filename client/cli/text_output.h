@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,8 @@ namespace cairn::client {
 // How many ROS 2 robots are not on the map, and where `problems` is given, how many problems there are: one line. Empty
 // where the server does not serve ROS 2 robots, or there is neither.
 [[nodiscard]] std::string FormatRos2Door(const Ros2Report& report, std::size_t problems = 0);
+// What sites have given up to stay below maps.max_memory_mib, a line for each of these. Empty where none has.
+[[nodiscard]] std::string FormatMemoryNotes(std::span<const MapInfo> maps);
 [[nodiscard]] std::string FormatMap(const MapInfo& map);
 [[nodiscard]] std::string FormatEdit(const MapEdit& edit);
 [[nodiscard]] std::string FormatTrajectoryError(const TrajectoryError& error);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
+#include <utility>
 
 #include "server/slam/grid/disagreement.h"
 #include "server/slam/grid/occupancy_grid.h"
@@ -15,6 +17,8 @@ constexpr double kSameAgreement = 0.005;   // Shares that differ by less are the
 // version moves every robot that drives.
 constexpr double kBetter = 0.9;
 constexpr double kAlignAgainAfter = 2.0;  // Ratio of keyframes, while a robot waits for being joined.
+// New keyframes of one robot that are enough. One is made every 0.25 m, or sooner where the robot turns.
+constexpr std::uint64_t kMostBetween = 1000;
 
 using PathOf = std::function<const std::vector<Pose2>&(std::size_t session)>;
 
@@ -85,17 +89,25 @@ bool AlignmentPace::IsDue(const std::string& site, const std::vector<SessionMate
   bool waits = false;
   for (const SessionMaterial& session : material) {
     if (session.start_known) {
-      now.made += session.snapshot.made();
-      ++now.sessions;
+      now[session.session] = session.snapshot.made();
     }
     waits = waits || (!session.start_known && session.joinable && !session.snapshot.keyframes.empty());
   }
   Known& before = sites_.try_emplace(site).first->second;
-  const bool joined = now.sessions > before.sessions;
-  const bool more =
-      now.made < before.made || static_cast<double>(now.made) >= kAlignAgainAfter * static_cast<double>(before.made);
+  const auto sum = [](const Known& known) {
+    return std::accumulate(known.begin(), known.end(), std::uint64_t{0},
+                           [](std::uint64_t made, const auto& one) { return made + one.second; });
+  };
+  const bool joined = now.size() > before.size();
+  const std::uint64_t made = sum(now), made_before = sum(before);
+  const bool more = made < made_before ||
+                    static_cast<double>(made) >= kAlignAgainAfter * static_cast<double>(made_before) ||
+                    std::ranges::any_of(now, [&before](const auto& one) {
+                      const auto then = before.find(one.first);
+                      return one.second >= kMostBetween + (then == before.end() ? 0 : then->second);
+                    });
   const bool due = !waits || (!joined && more);
-  if (due || joined) before = now;
+  if (due || joined) before = std::move(now);
   return due;
 }
 

@@ -38,7 +38,9 @@ struct Alignment {
 
 // When the next job of a site is to align. To align takes long, and no job looks for the place of another robot
 // meanwhile. So while a robot waits for being joined, a job aligns only when the robots whose places are known have
-// twice as many keyframes as when they were aligned last, or when the last one of them was joined. Not thread-safe.
+// twice as many keyframes as when they were aligned last, or when the last one of them was joined, or one of them a
+// thousand more (some 200 m of way): otherwise relations between the robots of today would be looked for after days
+// only, where a robot that is never joined waits in a site with a long past. Not thread-safe.
 class AlignmentPace {
  public:
   // Asked by every job that may align; where it says so, the job does.
@@ -47,11 +49,8 @@ class AlignmentPace {
   void KeepOnly(const std::function<bool(const std::string&)>& exists);
 
  private:
-  // The sessions whose places were known then, and the keyframes that they had made.
-  struct Known {
-    std::size_t sessions = 0;
-    std::uint64_t made = 0;
-  };
+  // The sessions whose places were known then, and the keyframes that each had made.
+  using Known = std::map<SessionId, std::uint64_t>;
   std::map<std::string, Known> sites_;
 };
 

@@ -29,6 +29,12 @@ struct JobSubject {
   std::vector<PoseHypothesis> places{};  // Where somebody says that the robot is. At the job's end: where it may be.
 };
 
+// Whether the job only looks for a robot: it makes no map version, and nothing else has to wait for it. REQUIRES: the
+// job has not ended, because the places of one that has are those it has found.
+[[nodiscard]] inline bool OnlyLooks(const Job& job) {
+  return job.kind == JobKind::kRelocalise && job.places.empty();
+}
+
 class JobList {
  public:
   // `now` is the server's clock. `journal`: null if nothing is stored.

@@ -31,49 +31,56 @@ JobWorker::JobWorker(const JobsOptions& options, JobList& list, JobWork work)
       list_(list),
       work_(std::move(work)),
       // One more than may be submitted: after a restart the job that ran waits again as well.
-      queue_(static_cast<std::size_t>(options.max_queued) + 1) {}
+      changes_(static_cast<std::size_t>(options.max_queued) + 1),
+      looks_(static_cast<std::size_t>(options.max_queued) + 1) {}
 
 JobWorker::~JobWorker() {
   Stop();
 }
 
 void JobWorker::Start() {
-  thread_ = std::jthread([this] { Run(); });
+  changing_ = std::jthread([this] { Run(changes_); });
+  looking_ = std::jthread([this] { Run(looks_); });
 }
 
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable, const std::string& request,
                               const JobSubject& about) {
   auto job = list_.Add(site, kind, enable, about);
-  if (job && (IsFull() || !queue_.TryPush(Ticket{job->id, enable, request}))) {
+  if (!job) return job;
+  Queue& queue = QueueOf(*job);
+  if (IsFull(queue) || !queue.TryPush(Ticket{job->id, enable, request})) {
     list_.Fail(job->id, TooManyWait());
     return tl::unexpected(TooManyWait());
   }
   return job;
 }
 
-Result<void> JobWorker::CheckRoom() const {
-  if (IsFull()) return tl::unexpected(TooManyWait());
+Result<void> JobWorker::CheckRoomToLook() const {
+  if (IsFull(looks_)) return tl::unexpected(TooManyWait());
   if (!list_.HasRoom()) return Fail(StatusCode::kResourceExhausted, std::string(kTooManyUnfinished));
   return {};
 }
 
 void JobWorker::Requeue(std::uint64_t id, bool enable) {
-  if (!queue_.TryPush(Ticket{id, enable, {}})) list_.Fail(id, TooManyWait());
+  const auto job = list_.Find(id);
+  if (job && !QueueOf(*job).TryPush(Ticket{id, enable, {}})) list_.Fail(id, TooManyWait());
 }
 
 void JobWorker::Cancel() {
-  queue_.Close();
+  changes_.Close();
+  looks_.Close();
   list_.CancelAll();
 }
 
 void JobWorker::Stop() {
   Cancel();
-  if (thread_.joinable()) thread_.join();
+  for (std::jthread* const thread : {&changing_, &looking_})
+    if (thread->joinable()) thread->join();
 }
 
-void JobWorker::Run() {
+void JobWorker::Run(Queue& queue) {
   LowerOwnPriority(options_.nice);
-  while (const auto ticket = queue_.Pop()) {
+  while (const auto ticket = queue.Pop()) {
     try {
       RunOne(*ticket);
     } catch (const std::exception& error) {  // Thrown by the list of jobs; what the work throws is caught in Work.

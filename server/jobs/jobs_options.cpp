@@ -22,12 +22,13 @@ void Visit(OptionVisitor& visitor, JobsOptions& options) {
                "Has no effect unless `joint` is true.");
   visitor.Real("join_way_m", options.join_way_m, "m", 1.0, 1e5,
                "How far such a robot, and the others of the site together, must have driven before it is tried for the "
-               "first time. It is tried again whenever it or they have driven a tenth more.");
+               "first time. It is tried again whenever it or they have driven a tenth more, or one of them 200 m.");
   visitor.Flag(
       "align", options.align,
       "Whether robots that have said where they start are fitted to each other by themselves, when two of them "
-      "have driven `join_way_m` and whenever all have driven a quarter more. A map version is made and enabled "
-      "only if it moves something by more than a cell and agrees better, and never in place of one that a "
+      "have driven `join_way_m` and whenever all have driven a quarter more, or one of them 200 m. A map version is "
+      "made and enabled only if it moves something by more than a cell and agrees better, and never in place of one "
+      "that a "
       "person has chosen. Has no effect unless `joint` is true.");
   visitor.Flag("check_starts", options.check_starts,
                "Whether a robot whose first metres contradict what others have drawn there is taken for one that has "

@@ -5,7 +5,8 @@
 // or those with whom it may be joined, have driven a tenth more. Such a job also fits robots that said where they
 // start to each other (jobs.align), so that a site's map stays right without a person. For these one is submitted when
 // two of them have driven jobs.join_way_m, and again when all have driven a quarter more; not while a person has chosen
-// the enabled map version (Site::MayBeAligned). Thread rule: one thread (housekeeping).
+// the enabled map version (Site::MayBeAligned). In both cases 200 m of one robot that drives are enough, however far
+// others have driven before. Thread rule: one thread (housekeeping).
 #pragma once
 
 #include <cstddef>
@@ -25,8 +26,9 @@ class Joiner {
   Joiner(const JobsOptions& options, const Roster& roster, const Atlas& atlas, const JobList& jobs, JobWorker& worker)
       : options_(options), roster_(roster), atlas_(atlas), jobs_(jobs), worker_(worker) {}
 
-  // Submits the jobs that are due, at most one per site. None while the site has a job that has not ended, because that
-  // job may join the fragment, and none where such a job has ended servers (JobList::EndsServers).
+  // Submits the jobs that are due, at most one per site. None while the site has a job that has not ended and may
+  // change its map, because that job may join the fragment, and none where such a job has ended servers
+  // (JobList::EndsServers).
   void Tick();
 
  private:
@@ -34,8 +36,8 @@ class Joiner {
   struct Driven {
     std::map<SessionId, double> fragments;
     double others_m = 0.0;
-    std::size_t far = 0;  // How many of the others have driven far enough to be fitted to each other,
-    bool active = false;  // and whether one of these still drives.
+    std::size_t far = 0;                  // How many of the others have driven far enough to be fitted to each other,
+    std::map<SessionId, double> today{};  // and those of them that have not ended.
   };
   [[nodiscard]] std::map<std::string, Driven> Look() const;
   [[nodiscard]] bool IsDue(const std::string& site, const Driven& now) const;

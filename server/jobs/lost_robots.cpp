@@ -28,25 +28,38 @@ void LostRobots::Tick(Clock::time_point now) {
   const auto first =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options_.relocalise_after_s));
   std::map<SessionId, Watched> lost;
+  Watched* next = nullptr;  // That has waited longest.
+  SessionState state_of_next;
   for (const auto& session : roster_.All()) {
     if (!IsLost(session->record())) continue;
     const auto known = lost_.find(session->id());
     Watched& one = lost[session->id()];
     one = known == lost_.end() ? Watched{first, now + first} : known->second;
-    const SessionState state = session->record().state();
-    if (now < one.due || !MayLookFor(state.site)) continue;
-    const LogContext context(AboutRobot(state.robot, state.site));
-    if (const auto job = worker_.Submit(state.site, JobKind::kRelocalise, true, "", {state.robot}); !job)
-      spdlog::warn("robot {}: no job to look for it could be submitted: {}", state.robot, job.error().message);
-    one.wait = std::min<Clock::duration>(2 * one.wait, kLongestWait);
-    one.due = now + one.wait;
+    if (now < one.due || (next != nullptr && next->due <= one.due)) continue;
+    SessionState state = session->record().state();
+    if (!MayLookFor(state)) continue;
+    next = &one;
+    state_of_next = std::move(state);
+  }
+  if (next != nullptr) {
+    LookFor(state_of_next);
+    next->wait = std::min<Clock::duration>(2 * next->wait, kLongestWait);
+    next->due = now + next->wait;
   }
   lost_ = std::move(lost);
 }
 
-bool LostRobots::MayLookFor(const std::string& site) const {
-  return std::ranges::all_of(jobs_.OfSite({}), [](const Job& job) { return IsFinal(job.state); }) &&
-         !jobs_.EndsServers(site, JobKind::kRelocalise);
+void LostRobots::LookFor(const SessionState& state) {
+  const LogContext context(AboutRobot(state.robot, state.site));
+  if (const auto job = worker_.Submit(state.site, JobKind::kRelocalise, true, "", {state.robot}); !job)
+    spdlog::warn("robot {}: no job to look for it could be submitted: {}", state.robot, job.error().message);
+}
+
+bool LostRobots::MayLookFor(const SessionState& state) const {
+  const auto in_the_way = [&state](const Job& job) {
+    return !IsFinal(job.state) && (OnlyLooks(job) || job.robot == state.robot);
+  };
+  return std::ranges::none_of(jobs_.OfSite({}), in_the_way) && !jobs_.EndsServers(state.site, JobKind::kRelocalise);
 }
 
 }  // namespace cairn::server

@@ -169,8 +169,9 @@ Result<JobOutcome> RelocaliseJob::Run(const Job& job, const JobControl& control)
     message += ": nothing was changed, because it is not connected, and its next scans would have to confirm it";
   } else {
     message +=
-        ": nothing was changed, because it has sent no scan, was found or lost anew, or has itself found another place "
-        "meanwhile";
+        ": nothing was changed, because it has sent no scan, was found or lost anew, has itself found another place, "
+        "or "
+        "has got a new map meanwhile";
   }
   return std::move(looked->outcome);
 }

@@ -4,7 +4,7 @@
 // no rival, the robot is told, and its next scans have to confirm it (slam::Recovery::Suggest); otherwise nothing is
 // changed. A robot that is not joined with the map of its site, and of which somebody says where it is, is joined there
 // if what it has seen agrees with the map; if it does not, nothing is changed.
-// Thread rule: runs on the job worker's thread. It waits for the session, and for the site, at most
+// Thread rule: runs on the job worker's threads. It waits for the session, and for the site, at most
 // jobs.snapshot_timeout_s each.
 #pragma once
 

@@ -196,8 +196,9 @@ bool SmoothJob::MayAlign(const Job& job) const {
   const auto site = atlas_.Find(job.site);
   if (!options_.align || job.kind != JobKind::kJoin || site == nullptr || !site->MayBeAligned()) return false;
   if (jobs_ == nullptr) return true;
-  return std::ranges::none_of(jobs_->OfSite(job.site),
-                              [&job](const Job& other) { return other.id != job.id && !IsFinal(other.state); });
+  return std::ranges::none_of(jobs_->OfSite(job.site), [&job](const Job& other) {
+    return other.id != job.id && !IsFinal(other.state) && !OnlyLooks(other);
+  });
 }
 
 Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<SessionMaterial>& material,

@@ -258,7 +258,7 @@ std::optional<Answer> Desk::Relocalise(const Request& request) {
     return roster_.Relocalise(request.robot, request.T_map_robot, receipt);
   };
   if (request.T_map_robot) return Order(request, order);
-  if (const auto room = worker_.CheckRoom(); !room) return ReplyTo(request, room.error());
+  if (const auto room = worker_.CheckRoomToLook(); !room) return ReplyTo(request, room.error());
   return Order(request, order, [&worker = worker_, site, robot = request.robot, id](Reply& reply) {
     auto job = worker.Submit(site, JobKind::kRelocalise, true, id, {robot});
     if (job) {

@@ -293,6 +293,8 @@ void Session::Drain() {
     ++handled_;
     handling_ = false;
   }
+  bool draws_on = false;
+  if (!failed_) Throws([&] { draws_on = estimator_.DrawLate(); });
   pace_.Worked(ThreadTime() - begin);
   const bool drained = queue_.empty();
   Throws([this] { TakeCheckpoint(); });
@@ -300,7 +302,7 @@ void Session::Drain() {
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
-  if (!queue_.empty()) Schedule();
+  if (!queue_.empty() || (draws_on && !failed_)) Schedule();
 }
 
 void Session::Handle(RobotEvent&& event) {

@@ -68,6 +68,9 @@ class SessionEstimator {
   // Settles an event without the estimator, also the one that failed: scans and odometry are counted as dropped,
   // whoever waits for an answer gets an empty one, and a correction is dropped.
   void Discard(RobotEvent&& event);
+  // Draws some of what a grid lacks that was taken over with a correction (slam::Mapper::DrawLate), and reports it.
+  // Returns whether there is more: to be called again, also where no event comes.
+  bool DrawLate();
   // Drops the scans inside the estimator.
   void DropWaiting();
 
@@ -80,7 +83,8 @@ class SessionEstimator {
   void Replayed();
   [[nodiscard]] bool replaying() const { return replaying_; }
   // Saves the state after the entries so far. The result is a function that makes the content; it may take long and may
-  // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save). Load restores this state;
+  // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save), or while DrawLate has
+  // something to do. Load restores this state;
   // then the entries that follow are replayed.
   [[nodiscard]] Journal::Content Save() const;
   // Called after each Save of which a checkpoint is made, before the next event. A place that a job has found, and that

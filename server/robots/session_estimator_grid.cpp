@@ -12,7 +12,7 @@ namespace cairn::server {
 RobotGrid SessionEstimator::DisplacedGrid() {
   const slam::Mapper& mapper = pipeline_.mapper();
   RobotGrid displaced{.chunks = PublishedChunks(),
-                      .keyframes = mapper.keyframes_made(),
+                      .keyframes = mapper.keyframes_drawn(),
                       .path = {},
                       .numbers = {},
                       .drawn = {},
@@ -55,6 +55,14 @@ bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   }
   SetEpoch(epoch);
   return adopted;
+}
+
+bool SessionEstimator::DrawLate() {
+  if (!pipeline_.mapper().draws_late()) return false;
+  const bool more = pipeline_.mapper().DrawLate();
+  GridChange change = TakeGridChange();
+  if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
+  return more;
 }
 
 // What has been said of the robot's way so far lies where the path lies now, and so where the grid shows it. What a

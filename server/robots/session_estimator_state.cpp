@@ -66,6 +66,8 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     // A switch that was not completed before the server ended has no effect.
     if (switched(correction->epoch, correction->generation))
       static_cast<void>(AdoptGrid(correction->epoch, FromStored(correction->grid)));
+    while (pipeline_.mapper().DrawLate()) {  // Nobody waits.
+    }
   } else if (const auto* const epoch = std::get_if<EpochChanged>(&entry)) {
     SetEpoch(epoch->epoch);
   } else if (const auto* const relocalise = std::get_if<RelocaliseTaken>(&entry)) {
@@ -95,6 +97,7 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (switch_completed_ && !*switch_completed_) return nullptr;
+  if (pipeline_.mapper().draws_late()) return nullptr;  // It would draw them all.
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });

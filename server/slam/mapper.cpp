@@ -41,7 +41,7 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
-  if (s.drawing.redrawing()) {
+  if (s.drawing.redrawing() || s.drawing.late()) {
     s.Begin(ScanStep::kDraw);
     s.drawing.Continue(s.trail.keyframes(), s.believed_path());
   }
@@ -150,6 +150,7 @@ void Mapper::State::RetireKeyframes() {
   std::size_t end = trail.size() - std::min(trail.size(), static_cast<std::size_t>(limits.recent_keyframes));
   for (std::size_t i = 1; i < filter->hypothesis_count(); ++i) end = filter->hypothesis(i).path.SharedWith(path, end);
   if (const auto retirement = ChooseRetired(trail, path, end, limits)) {
+    drawing.DrawAllLate(trail.keyframes());
     trail.Retire(*retirement);
     filter->Retire(*retirement);
     loops.Retire(*retirement);
@@ -323,6 +324,7 @@ std::vector<Pose2> Mapper::BestPath() const {
 }
 
 void Mapper::Save(StateWriter& archive) const {
+  state_->drawing.DrawAllLate(state_->trail.keyframes());
   archive(*state_);
   state_->filter->Save(archive);
 }

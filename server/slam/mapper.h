@@ -90,6 +90,9 @@ class Mapper {
   // The keyframes that are kept, and all that there have been.
   [[nodiscard]] std::size_t keyframe_count() const;
   [[nodiscard]] std::uint64_t keyframes_made() const;
+  // All with smaller numbers are in the grid, and no other: fewer than have been made while a grid that was adopted is
+  // still being continued.
+  [[nodiscard]] std::uint64_t keyframes_drawn() const;
   // The numbers (trail/keyframe.h) of those that are kept, increasing.
   [[nodiscard]] std::vector<std::uint64_t> keyframe_numbers() const;
   // Those that are drawn into the grid (Keyframe::localized), by increasing number, and T_map_robot at which they are.
@@ -110,13 +113,19 @@ class Mapper {
   // (keyframes_made). `path` holds the poses of those with these `numbers` in it (none: 0, 1, 2, ...): path, particles,
   // landmarks and the pose follow, so that all agree with the grid. The later keyframes keep their places relative to
   // the last of these. If `path` lacks one of the earlier keyframes, or the filter can not follow (Filter::rebases),
-  // only the grid is replaced. Then draws the later keyframes onto it along the present best path. Every chunk of both
-  // grids counts as changed. Where the grid knows of later keyframes than this mapper has made, or where it is in
-  // another frame than this mapper's path (`must_follow`), it can only be used if the path follows; else nothing is
-  // changed and the answer is false. `drawn`: the poses at which these keyframes are in the grid, if not at `path`.
+  // only the grid is replaced. Then draws the later keyframes onto it along the present best path; where these are
+  // many, some with every scan and every call of DrawLate; when this happens changes nothing but the grid until then.
+  // Every chunk of both grids counts as changed. Where the grid knows of later keyframes than this mapper has made, or
+  // where it is in another frame than this mapper's path (`must_follow`), it can only be used if the path follows; else
+  // nothing is changed and the answer is false. `drawn`: the poses at which these keyframes are in the grid, if not at
+  // `path`.
   bool AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path = {},
                  std::span<const std::uint64_t> numbers = {}, bool must_follow = false,
                  std::span<const Pose2> drawn = {});
+  // Draws some of the keyframes that a grid lacks which was adopted: a few milliseconds. Returns whether there are
+  // more.
+  bool DrawLate();
+  [[nodiscard]] bool draws_late() const;
   // Whether the path can follow that of a job (Filter::rebases).
   [[nodiscard]] bool follows_paths() const;
   // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last
@@ -160,6 +169,7 @@ class Mapper {
 
   // Writes the whole state, and replaces it by one of a mapper with the same options (state/archive.h). If reading
   // fails, nothing changes.
+  // First draws what an adopted grid still lacks (draws_late).
   void Save(StateWriter& archive) const;
   void Load(StateReader& archive);
 

@@ -29,6 +29,22 @@ Mapper::DrawnKeyframes Mapper::drawn_keyframes() const {
   return drawn;
 }
 
+bool Mapper::DrawLate() {
+  State& s = *state_;
+  s.drawing.DrawLate(s.trail.keyframes());
+  return s.drawing.late();
+}
+
+bool Mapper::draws_late() const {
+  return state_->drawing.late();
+}
+
+std::uint64_t Mapper::keyframes_drawn() const {
+  const State& s = *state_;
+  const std::size_t drawn = s.drawing.drawn();
+  return drawn < s.drawing.path().size() ? s.trail.shapes()[drawn].number : s.trail.made();
+}
+
 const std::vector<Pose2>& Mapper::drawn_path() const {
   return state_->drawing.path();
 }

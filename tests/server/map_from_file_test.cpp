@@ -89,8 +89,9 @@ TEST(MapFromFile, ARobotIsLocalisedInItAtTheRightPlace) {
   EXPECT_TRUE(pose.localized) << PoseReasonName(pose.reason);
   EXPECT_LT((pose.T_map_robot.translation() - TruePose(39).translation()).norm(), 0.1);
   EXPECT_LT(std::abs(WrapAngle(pose.T_map_robot.theta - TruePose(39).theta)), 0.05);
-  // Where it starts was not said: it is found or not, and never elsewhere.
-  house.Drive("r2", kVisitor, 0, 40);
+  // Where it starts was not said: it is found, and never elsewhere.
+  house.Drive("r2", kVisitor, 0, 160);
+  EXPECT_TRUE(LastPoseIn(house, "r2").localized) << PoseReasonName(LastPoseIn(house, "r2").reason);
   for (const PoseReport& one : house.All<PoseReport>()) {
     if (one.robot != "r2" || !one.localized) continue;
     const Pose2 truth = TruePose(static_cast<int>(one.scan_sequence) - 1);

@@ -174,6 +174,16 @@ TEST(TopTable, StatusSaysHowManyRos2RobotsAreNotOnTheMap) {
   EXPECT_EQ(FormatRos2Door({}), "");
 }
 
+// Who looks at the status only must learn that the map is less than it was.
+TEST(TopTable, StatusSaysWhatSitesHaveGivenUp) {
+  std::vector<MapInfo> maps(2);
+  maps[0].site = "lab";
+  maps[1].site = "hall";
+  EXPECT_EQ(FormatMemoryNotes(maps), "");
+  maps[1].memory_note = "map versions removed: 2";
+  EXPECT_EQ(FormatMemoryNotes(maps), "memory of site hall: map versions removed: 2\n");
+}
+
 TEST(TopTable, FitsTheTerminalAndSaysWhatIsMissing) {
   TopView now;
   now.status.load.up_s = 60.0;

@@ -52,6 +52,7 @@ TEST(AlignmentPace, ARobotThatWaitsToBeJoinedComesFirst) {
   AlignmentPace pace;
   const auto due = [&pace](std::size_t known, std::size_t keyframes, bool waits) {
     std::vector<SessionMaterial> material(known, WithKeyframes(true, keyframes));
+    for (std::size_t i = 0; i < known; ++i) material[i].session = i + 2;
     if (waits) material.push_back(WithKeyframes(false, 5));
     return pace.IsDue("lab", material);
   };
@@ -63,6 +64,22 @@ TEST(AlignmentPace, ARobotThatWaitsToBeJoinedComesFirst) {
   EXPECT_TRUE(due(3, 42, false)) << "nobody waits";
   pace.KeepOnly([](const std::string&) { return false; });
   EXPECT_FALSE(due(3, 43, true)) << "another site of this name";
+}
+
+// A robot that is never joined must not keep those of today from being aligned for days, however long the past is.
+TEST(AlignmentPace, AThousandKeyframesOfOneRobotAreEnough) {
+  AlignmentPace pace;
+  const auto due = [&pace](std::size_t today) {
+    std::vector<SessionMaterial> material{WithKeyframes(true, 50000), WithKeyframes(true, today),
+                                          WithKeyframes(false, 5)};
+    for (std::size_t i = 0; i < material.size(); ++i) material[i].session = i + 1;
+    return pace.IsDue("lab", material);
+  };
+  EXPECT_FALSE(due(100)) << "joined by the last job";
+  EXPECT_FALSE(due(1099));
+  EXPECT_TRUE(due(1100));
+  EXPECT_FALSE(due(2099));
+  EXPECT_TRUE(due(2100));
 }
 
 }  // namespace

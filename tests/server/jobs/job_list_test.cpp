@@ -238,6 +238,33 @@ TEST(JobWorker, RunsOneAfterTheOtherRefusesWhenFullAndStopsByCancelling) {
   EXPECT_EQ(list.Find(second->id)->state, JobState::kCancelled);
 }
 
+// A robot that is lost does not wait for a job that takes minutes.
+TEST(JobWorker, AJobThatOnlyLooksForARobotRunsBesideOneThatMayChangeAMap) {
+  Outbound outbound(32);
+  JobList list({}, outbound, [] { return Stamp{0}; });
+  BoundedChannel<std::uint64_t> started(8), ended(8);
+  JobWorker worker({}, list, [&](const Job& job, bool, const JobControl& control) {
+    EXPECT_TRUE(started.TryPush(std::uint64_t{job.id}));
+    while (job.kind == JobKind::kSmooth && !control.cancelled()) std::this_thread::yield();
+    EXPECT_TRUE(ended.TryPush(std::uint64_t{job.id}));
+    return Result<JobOutcome>(JobOutcome{});
+  });
+  worker.Start();
+  const auto smooth = worker.Submit("lab", JobKind::kSmooth, true);
+  ASSERT_TRUE(smooth);
+  EXPECT_EQ(started.Pop(), smooth->id);
+  // This one joins a robot where somebody says that it is, which makes a map version.
+  const auto join = worker.Submit("lab", JobKind::kRelocalise, true, "", {"r2", {PoseHypothesis{}}});
+  ASSERT_TRUE(join);
+  const auto look = worker.Submit("lab", JobKind::kRelocalise, true, "", {"r1"});
+  ASSERT_TRUE(look);
+  EXPECT_EQ(started.Pop(), look->id);
+  EXPECT_EQ(ended.Pop(), look->id);
+  EXPECT_EQ(list.Find(smooth->id)->state, JobState::kRunning);
+  EXPECT_EQ(list.Find(join->id)->state, JobState::kQueued);
+  worker.Stop();
+}
+
 TEST(JobWorker, AJobThatWasCancelledWhileItWaitedIsNotRun) {
   Outbound outbound(32);
   JobList list({}, outbound, [] { return Stamp{0}; });

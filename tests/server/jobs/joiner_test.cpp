@@ -105,6 +105,30 @@ TEST_F(JoinerTest, AlignsRobotsWithKnownStartsAndAgainAfterAQuarterMore) {
   EXPECT_TRUE(Tries()) << "one more has driven far enough";
 }
 
+// After months a quarter of all that was driven would be weeks.
+TEST_F(JoinerTest, TwoHundredMetresOfARobotOfTodayAreEnoughHoweverFarOthersHaveDriven) {
+  roster().Find("r2")->record().SetJoining({false, 20.0});
+  Driven("r1", 100000.0);
+  EXPECT_TRUE(Tries());
+  Driven("r2", 219.0);
+  EXPECT_FALSE(Tries());
+  Driven("r2", 220.0);
+  EXPECT_TRUE(Tries());
+  EXPECT_FALSE(Tries());
+  Driven("r1", 100201.0);
+  EXPECT_TRUE(Tries()) << "any robot of today";
+  roster().Take(RequestOf("r3", 9));
+  Driven("r3", 5000.0);
+  EXPECT_TRUE(Tries()) << "a fragment";
+  Driven("r3", 5199.0);
+  EXPECT_FALSE(Tries());
+  Driven("r3", 5200.0);
+  EXPECT_TRUE(Tries());
+  EXPECT_FALSE(Tries());
+  Driven("r2", 421.0);
+  EXPECT_TRUE(Tries()) << "it may be where the fragment has been";
+}
+
 TEST_F(JoinerTest, AlignsNothingWhereItIsSwitchedOffOrAPersonHasChosenTheMap) {
   roster().Find("r2")->record().SetJoining({false, 40.0});
   Driven("r1", 100.0);

@@ -16,13 +16,13 @@ class LostRobotsTest : public testing::RosterTest {
  protected:
   LostRobotsTest() { roster().Take(RequestOf("r1", testing::kOwner)); }
 
-  void Report(const std::string& robot, PoseReason reason) {
+  void Report(const std::string& robot, PoseReason reason, SessionToken token = testing::kOwner) {
     PoseReport pose;
     pose.stamp = ++stamp_;
     pose.scan_sequence = static_cast<std::uint64_t>(stamp_);
     pose.localized = reason == PoseReason::kTracking;
     pose.reason = reason;
-    const StreamId stream{HashName(robot), HashName("laser"), testing::kOwner};
+    const StreamId stream{HashName(robot), HashName("laser"), token};
     SessionRecord& record = roster().Find(robot)->record();
     EXPECT_EQ(record.ScanReceived(stream, pose.scan_sequence), SessionRecord::Arrival::kNew);
     record.ScanUsed(stream, pose, pose.stamp, true, 1.0);
@@ -68,9 +68,42 @@ TEST_F(LostRobotsTest, ARobotThatWasFoundMeanwhileIsNotLookedFor) {
   EXPECT_EQ(JobsAfter(seconds(20)), 1U);
 }
 
-TEST_F(LostRobotsTest, NobodyWaitsForIt) {
+// Jobs that take minutes, of its site and of others, do not keep it waiting.
+TEST_F(LostRobotsTest, IsLookedForWhileOtherJobsRun) {
   Report("r1", PoseReason::kLost);
-  ASSERT_TRUE(jobs_.Add("hall", JobKind::kSmooth));
+  for (const char* const site : {"lab", "hall"}) {
+    const auto job = jobs_.Add(site, JobKind::kSmooth);
+    ASSERT_TRUE(job);
+    ASSERT_TRUE(jobs_.Start(job->id));
+  }
+  EXPECT_EQ(JobsAfter(seconds(0)), 2U);
+  EXPECT_EQ(JobsAfter(seconds(10)), 3U);
+  EXPECT_EQ(JobsAfter(seconds(31)), 3U) << "it is looked for already";
+}
+
+TEST_F(LostRobotsTest, OnlyOneJobLooksForRobotsAndOfTheseTheOneFirstThatHasWaitedLongest) {
+  const auto looked_for = [this] {
+    for (const Job& job : jobs_.OfSite({}))
+      if (!IsFinal(job.state)) return job.robot;
+    return std::string("nobody");
+  };
+  roster().Take(RequestOf("r2", 8));
+  roster().Find("r2")->record().SetJoining({});
+  Report("r2", PoseReason::kLost, 8);
+  EXPECT_EQ(JobsAfter(seconds(0)), 0U);
+  Report("r1", PoseReason::kLost);
+  EXPECT_EQ(JobsAfter(seconds(5)), 0U);
+  EXPECT_EQ(JobsAfter(seconds(16)), 1U);
+  EXPECT_EQ(looked_for(), "r2");
+  EXPECT_EQ(JobsAfter(seconds(17)), 1U);
+  EndAll();
+  EXPECT_EQ(JobsAfter(seconds(18)), 2U);
+  EXPECT_EQ(looked_for(), "r1");
+}
+
+TEST_F(LostRobotsTest, WhereAPersonHasSaidWhereItIsItIsNotLookedFor) {
+  Report("r1", PoseReason::kLost);
+  ASSERT_TRUE(jobs_.Add("lab", JobKind::kRelocalise, true, {"r1", {PoseHypothesis{}}}));
   EXPECT_EQ(JobsAfter(seconds(0)), 1U);
   EXPECT_EQ(JobsAfter(seconds(20)), 1U);
   EndAll();

@@ -143,6 +143,22 @@ TEST_F(StoredSessionTest, ThatHasEndedTakesACheckpointAfterItsEndAndAfterEachMap
   EXPECT_TRUE(Ticked(2));
 }
 
+// A session whose robot is away, or that has ended, gets no scan with which it could draw.
+TEST(StoredSession, WhatAMapLacksThatItTakesOverIsDrawnWithoutFurtherScans) {
+  OneSession one;
+  for (int step = 0; step < 260; step += 20) {
+    one.Drive(step, step + 20);
+    ASSERT_TRUE(one.WaitSettled(static_cast<std::uint64_t>(step) + 20));
+  }
+  ASSERT_GT(one.ledger().keyframes, 45U);
+  ASSERT_TRUE(one.sent().WaitFor([&] { return !one.session().has_work(); }));
+  const int before = one.grid_changes;
+  std::atomic<bool> adopted{false};
+  one.session().Adopt({.epoch = 4, .grid = {}, .done = [&](Adopted&&) { adopted = true; }});
+  EXPECT_TRUE(one.sent().WaitFor([&] { return adopted && !one.session().has_work(); }));
+  EXPECT_GE(one.grid_changes - before, 3) << "twenty keyframes at a time";
+}
+
 // It fails at the same scan each time that it is read: nothing of its map was shown any more.
 TEST(StoredSession, AnExceptionWhileItIsRestoredLeavesItsPartOfTheMap) {
   std::vector<JournalEntry> journal;

@@ -8,6 +8,7 @@
 
 #include "server/slam/graph/pose_graph.h"
 #include "server/slam/mapper.h"
+#include "server/slam/state/archive.h"
 #include "tests/server/slam/ring_drive.h"
 
 namespace cairn::slam {
@@ -196,6 +197,32 @@ TEST(MapperFollows, WhatWasDrivenSinceAVersionFitsWhatWasSeenAgain) {
                          Between(drive.truth[40], drive.truth[280]);
   EXPECT_LT((last.T_map_robot.translation() - expected.translation()).norm(), 0.05);
   EXPECT_TRUE(last.localized);
+}
+
+// Where a site goes back to an old map, a robot may lack thousands of keyframes in it.
+TEST(MapperFollows, WhatAnAdoptedGridLacksIsDrawnSomeAtATimeAndBeforeACheckpoint) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 5;
+  Mapper mapper(options, drive.truth.front(), 1);
+  for (std::size_t i = 0; i < 160; ++i) static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  ASSERT_GT(mapper.keyframe_count(), 45U);
+  ASSERT_TRUE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), 0));
+  EXPECT_TRUE(mapper.draws_late());
+  EXPECT_EQ(mapper.keyframes_drawn(), 0U);
+  EXPECT_EQ(mapper.grid().chunk_count(), 0U);
+  EXPECT_TRUE(mapper.DrawLate());
+  EXPECT_EQ(mapper.keyframes_drawn(), 20U);
+  StateWriter checkpoint;
+  mapper.Save(checkpoint);
+  EXPECT_FALSE(mapper.draws_late());
+  EXPECT_EQ(mapper.keyframes_drawn(), mapper.keyframes_made());
+  const MapperSnapshot snapshot = mapper.Snapshot();
+  OccupancyGrid expected(mapper.grid().options());
+  for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k)
+    if (snapshot.keyframes[k].localized) expected.Draw(*snapshot.keyframes[k].scan, snapshot.online_path[k]);
+  EXPECT_EQ(ShareMissing(expected, mapper.grid()), 0.0);
+  EXPECT_EQ(ShareMissing(mapper.grid(), expected), 0.0);
 }
 
 // A path that does not belong to the keyframes is not taken.

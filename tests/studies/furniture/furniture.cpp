@@ -2,7 +2,7 @@
 // piece stood until the joint map does not show it any more, and is what was brought there shown? With one and with
 // several runs before; and, for comparison, if the runs before counted as much as the one of today. The same where the
 // robots that drew it have not ended, as in a fleet that drives day and night. Then doors that open and close
-// (doors.cpp). --only moved, --only doors: one part.
+// (doors.cpp), and people who walk (people.cpp). --only moved, --only doors, --only people: one part.
 #include "client/sim/furniture.h"
 
 #include <algorithm>
@@ -20,6 +20,7 @@
 #include "server/maps/maps_options.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/studies/furniture/doors.h"
+#include "tests/studies/furniture/people.h"
 #include "tests/studies/logs.h"
 #include "tests/studies/study.h"
 
@@ -236,10 +237,11 @@ void StudyMovedFurniture(StudyContext& context) {
 void StudyFurniture(StudyContext& context) {
   if (context.Wants("moved")) StudyMovedFurniture(context);
   if (context.Wants("doors")) StudyDoors(context);
+  if (context.Wants("people")) StudyPeople(context);
 }
 
 const Registration kFurniture("furniture",
-                              "furniture that was moved between two runs, and doors: how soon the map shows it",
+                              "furniture that was moved between two runs, doors, people: what the map shows of them",
                               StudyFurniture);
 
 }  // namespace

@@ -63,6 +63,9 @@ struct JobTime {
   std::size_t keyframes = 0, drawn_anew = 0;  // Along both paths.
 };
 
+constexpr double kMostLiveRatio = 1.2;
+constexpr double kMostSecondJob = 0.1;  // Of the first one's processor time.
+
 // What a job of the server does with them: smooths them together, and draws and compares each along both its paths.
 JobTime RunJob(const std::vector<slam::MapperSnapshot>& snapshots, const slam::MapperOptions& options,
                slam::RelationBook& book, std::vector<slam::DrawnMaps>& drawings) {
@@ -89,7 +92,7 @@ JobTime RunJob(const std::vector<slam::MapperSnapshot>& snapshots, const slam::M
 
 // A job, and a second one when little has changed: each robot has driven three hundredths more.
 void RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, const slam::MapperOptions& options,
-                Table& table) {
+                StudyContext& context, Table& table) {
   constexpr double kBefore = 0.97;
   std::vector<slam::MapperSnapshot> before, now;
   for (const LogRun& run : runs) {
@@ -106,6 +109,10 @@ void RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, const 
              std::to_string(second.drawn_anew) + " of " + std::to_string(second.keyframes),
              std::to_string(measured_first), std::to_string(book.measured()), std::to_string(book.reused()),
              Number(1e-6 * static_cast<double>(book.BytesOf({1, 2}).size()), 2)});
+  if (context.quick) return;
+  context.report.Expect(
+      second.all_s <= kMostSecondJob * first.all_s,
+      name + ": a second job took " + Number(100.0 * second.all_s / first.all_s, 1) + " % of the first one");
 }
 
 Trajectory PathOf(const std::vector<LogRun>& runs, const Joined& joined) {
@@ -160,7 +167,11 @@ void RunCut(StudyContext& context, const Case& one, Table& table, Table& session
     context.report.Progress(part.name);
     runs.push_back(RunOverLog(part, options));
   }
-  RunTwoJobs(runs, one.log, options, jobs);
+  RunTwoJobs(runs, one.log, options, context, jobs);
+  if (!context.quick)
+    context.report.Expect(
+        live_m <= kMostLiveRatio * alone_m,
+        one.log + ": the live path is " + Number(live_m / alone_m, 2) + " times as inexact as the smoothed one");
   std::vector<std::size_t> order(one.parts);
   std::iota(order.begin(), order.end(), std::size_t{0});
   for (const bool reversed : {false, true}) {

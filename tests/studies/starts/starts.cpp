@@ -2,6 +2,7 @@
 // way the map contradicts what such a robot draws, and whether it ever contradicts one whose start is as exact as a
 // person says it. Through the estimator, the comparison and the judgement of the server (jobs/start_judgement.h),
 // without a server. --runs: starts for each robot and kind (10).
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -28,6 +29,9 @@ using server::StartJudgement;
 using slam::OccupancyGrid;
 
 constexpr double kWantedM = 5.0;  // A wrong start is to be noticed within this way.
+// Of the wrong starts that there is something to compare with, in all worlds: so many are refused on the first 8 m. All
+// are wanted; this is what holds today, so that it does not become less without being noticed.
+constexpr double kLeastRefused = 0.8;
 
 sim::Fleet MakeFleet(const std::string& world, std::uint64_t seed) {
   auto surroundings = sim::OpenSurroundings(world);
@@ -112,12 +116,14 @@ const std::vector<Kind> kKinds = {
 
 struct Count {
   int starts = 0, judged = 0, refused_within = 0, refused = 0;
+  double sum_m = 0.0, most_m = 0.0;            // Way until they were refused.
   double most_share = 0.0, least_share = 1.0;  // Of those that were judged, at the end.
 };
 
 void RunStarts(StudyContext& context) {
   Report& report = context.report;
   const int runs = context.runs > 0 ? context.runs : context.Pick(10, 1);
+  Count wrong;  // In all worlds.
   for (const std::string world : {"office", "building", "storey"}) {
     report.Heading("World " + world);
     sim::Fleet fleet = MakeFleet(world, context.seed);
@@ -156,7 +162,11 @@ void RunStarts(StudyContext& context) {
           ++count.starts;
           if (last.compared < 100) continue;
           ++count.judged;
-          count.refused += refused_m ? 1 : 0;
+          if (refused_m) {
+            ++count.refused;
+            count.sum_m += *refused_m;
+            count.most_m = std::max(count.most_m, *refused_m);
+          }
           count.refused_within += refused_m && *refused_m <= kWantedM ? 1 : 0;
           count.most_share = std::max(count.most_share, last.contradicted_share());
           count.least_share = std::min(count.least_share, last.contradicted_share());
@@ -164,16 +174,31 @@ void RunStarts(StudyContext& context) {
       }
     }
     Table table({"start said", "starts", "with something to compare", "refused within 5 m", "refused within 8 m",
-                 "share that contradicts, least (%)", "most (%)"});
+                 "after (m), mean", "most", "share that contradicts, least (%)", "most (%)"});
     for (const Kind& kind : kKinds) {
       const Count& count = counts[kind.name];
       table.Add({kind.name, std::to_string(count.starts), std::to_string(count.judged),
                  std::to_string(count.refused_within), std::to_string(count.refused),
+                 Number(count.sum_m / std::max(1, count.refused), 1), Number(count.most_m, 1),
                  Number(100.0 * count.least_share, 1), Number(100.0 * count.most_share, 1)});
-      if (!kind.wrong) report.Expect(count.refused == 0, world + ": a start said " + kind.name + " was refused");
+      if (!kind.wrong) {
+        report.Expect(count.refused == 0, world + ": a start said " + kind.name + " was refused");
+        continue;
+      }
+      wrong.judged += count.judged;
+      wrong.refused += count.refused;
+      wrong.sum_m += count.sum_m;
+      wrong.most_m = std::max(wrong.most_m, count.most_m);
     }
     report.Add(table, "starts-" + world);
   }
+  const std::string share = Number(100.0 * wrong.refused / std::max(1, wrong.judged), 0) + " %";
+  report.Text("Wrong starts in all worlds: " + std::to_string(wrong.refused) + " of " + std::to_string(wrong.judged) +
+              " with something to compare were refused (" + share + "), after " +
+              Number(wrong.sum_m / std::max(1, wrong.refused), 1) + " m of way on the average and " +
+              Number(wrong.most_m, 1) + " m at most. The rest drove on with a wrong start.");
+  if (!context.quick)
+    report.Expect(wrong.refused >= kLeastRefused * wrong.judged, "only " + share + " of the wrong starts were refused");
 }
 
 const Registration kStarts("starts", "wrong starts in a map that others have made: whether and when they are noticed",

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "tests/server/support/room_world.h"
 
 namespace cairn::slam {
@@ -190,6 +192,52 @@ TEST_F(RedrawnMap, AGridThatComesWhileTheMapIsDrawnAgainDoesNotEndThat) {
   drawing_.Finish(keyframes_, corrected_);
   EXPECT_EQ(drawing_.grid().chunk_count(), kMany * ChunksOfOne());
   EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(0)));
+}
+
+// Where a site goes back to an old map, a robot may lack thousands of keyframes in it, and its scans must not wait.
+TEST_F(RedrawnMap, AnAdoptedGridThatLacksManyKeyframesGetsSomeWithEachScan) {
+  drawing_.Adopt(GridOf(3, CorrectedPlaceOf), 3, 3, keyframes_, corrected_);
+  EXPECT_TRUE(drawing_.late());
+  EXPECT_EQ(drawing_.drawn(), 3U);
+  EXPECT_EQ(drawing_.grid().chunk_count(), 3 * ChunksOfOne()) << "the map is that of the version from the beginning";
+  EXPECT_EQ(drawing_.path()[kMany - 1], CorrectedPlaceOf(kMany - 1));
+  drawing_.Continue(keyframes_, corrected_);
+  EXPECT_EQ(drawing_.grid().chunk_count(), 23 * ChunksOfOne());
+  // A keyframe that comes meanwhile waits for its turn.
+  keyframes_.push_back(keyframes_.back());
+  corrected_.Append(CorrectedPlaceOf(kMany));
+  drawing_.Add(keyframes_.back(), CorrectedPlaceOf(kMany));
+  EXPECT_FALSE(DrawnAt(CorrectedPlaceOf(kMany)));
+  drawing_.DrawLate(keyframes_);
+  EXPECT_EQ(drawing_.drawn(), 43U);
+  drawing_.DrawLate(keyframes_);
+  EXPECT_FALSE(drawing_.late());
+  EXPECT_EQ(drawing_.grid().chunk_count(), (kMany + 1) * ChunksOfOne());
+  EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(kMany)));
+  drawing_.Add(keyframes_.back(), CorrectedPlaceOf(kMany + 1));
+  EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(kMany + 1))) << "all are drawn, so this one is at once";
+}
+
+// Where its poses in the old map are known, those stay, and the others are those at which it is drawn.
+TEST_F(RedrawnMap, KnowsWhereTheKeyframesOfAnAdoptedGridAreDrawn) {
+  std::vector<Pose2> in_grid;
+  for (std::size_t k = 0; k < 3; ++k) in_grid.push_back(PlaceOf(k));
+  drawing_.Adopt(GridOf(3, PlaceOf), 3, 3, keyframes_, corrected_, true, in_grid);
+  drawing_.Finish(keyframes_, corrected_);
+  EXPECT_EQ(drawing_.path()[2], PlaceOf(2));
+  EXPECT_EQ(drawing_.path()[3], CorrectedPlaceOf(3));
+  EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(kMany - 1)));
+}
+
+TEST_F(RedrawnMap, ALargeLoopWhileAnAdoptedGridIsContinuedDrawsAllAgain) {
+  drawing_.Adopt(GridOf(3, PlaceOf), 3, 3, keyframes_, corrected_);
+  drawing_.StartAgain(kMany);
+  drawing_.Continue(keyframes_, corrected_);
+  EXPECT_EQ(drawing_.drawn(), 23U) << "until then the map that was taken over is continued";
+  drawing_.Finish(keyframes_, corrected_);
+  EXPECT_FALSE(drawing_.late());
+  EXPECT_EQ(drawing_.grid().chunk_count(), kMany * ChunksOfOne());
+  EXPECT_EQ(drawing_.path()[0], CorrectedPlaceOf(0));
 }
 
 }  // namespace
