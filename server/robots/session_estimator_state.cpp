@@ -2,6 +2,7 @@
 #include <utility>
 #include <variant>
 
+#include "common/file/number_bytes.h"
 #include "server/maps/stored_grid.h"
 #include "server/robots/session_estimator.h"
 
@@ -9,20 +10,6 @@ namespace cairn::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string BytesOfNumber(std::uint64_t number) {
-  std::string bytes;
-  for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(number >> (8 * i)));
-  return bytes;
-}
-
-std::optional<std::uint64_t> TakeNumber(std::string_view& bytes) {
-  if (bytes.size() < 8) return std::nullopt;
-  std::uint64_t number = 0;
-  for (std::size_t i = 0; i < 8; ++i) number |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
-  bytes.remove_prefix(8);
-  return number;
-}
 
 // The main part of a checkpoint: of the session, with the number of its pieces, and of the estimator.
 struct CheckpointParts {
@@ -34,11 +21,11 @@ struct CheckpointParts {
 Result<CheckpointParts> PartsOf(std::string_view main) {
   const auto too_short = [] { return Fail(StatusCode::kDataLoss, "a checkpoint is too short"); };
   CheckpointParts parts;
-  const auto size = TakeNumber(main);
+  const auto size = TakeNumber<std::uint64_t>(main);
   if (!size || *size > main.size()) return too_short();
   parts.session = main.substr(0, *size);
   main.remove_prefix(parts.session.size());
-  const auto pieces = TakeNumber(main);
+  const auto pieces = TakeNumber<std::uint64_t>(main);
   if (!pieces) return too_short();
   parts.session_pieces = *pieces;
   parts.estimator = main;
