@@ -89,8 +89,8 @@ Journal::Content SessionEstimator::Save() const {
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Main();
-    CheckpointContent content{BytesOfNumber(own.size()) + own + BytesOfNumber(writer->pieces().size()) +
-                              pipeline->Main()};
+    CheckpointContent content{BytesOfNumber(std::uint64_t{own.size()}) + own +
+                              BytesOfNumber(std::uint64_t{writer->pieces().size()}) + pipeline->Main()};
     for (const auto* const pieces : {&writer->pieces(), &pipeline->pieces()})
       for (const slam::StatePiece& piece : *pieces)
         content.pieces.push_back({piece.value, [piece] { return piece.Bytes(); }});
@@ -127,6 +127,8 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  if (const auto map = pipeline_.mapper().known_map(); map != nullptr && known_grids_ != nullptr)
+    pipeline_.mapper().ShareKnownMap(known_grids_->SameAs(map));
   record_.SetLearned(pipeline_.mapper().learned());
   ended_ = record_.phase() == SessionPhase::kEnded;
   record_.SetLocalises(pipeline_.mapper().localises());

@@ -147,6 +147,10 @@ class Mapper {
   [[nodiscard]] bool localises() const;
   // The epoch of the map in which it is localised; nothing if it maps.
   [[nodiscard]] std::optional<std::uint32_t> known_map_epoch() const;
+  // That map, null if it maps; and a copy of it that others use, too (KnownGrid::IsSameAs), in its place. A mapper
+  // whose state was read has a map of its own.
+  [[nodiscard]] std::shared_ptr<const KnownGrid> known_map() const;
+  void ShareKnownMap(std::shared_ptr<const KnownGrid> same);
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
   // The best path by stamps: where the robot was at the first of the scans that were seen from each keyframe. Empty

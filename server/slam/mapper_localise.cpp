@@ -139,4 +139,12 @@ std::optional<std::uint32_t> Mapper::known_map_epoch() const {
   return state_->localisation->map()->source().epoch;
 }
 
+std::shared_ptr<const KnownGrid> Mapper::known_map() const {
+  return state_->localisation ? state_->localisation->map() : nullptr;
+}
+
+void Mapper::ShareKnownMap(std::shared_ptr<const KnownGrid> same) {
+  if (state_->localisation) state_->localisation->ShareMap(std::move(same));
+}
+
 }  // namespace cairn::slam
