@@ -102,7 +102,10 @@ class Mapper {
   [[nodiscard]] const std::vector<Pose2>& drawn_path() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
-  // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
+  // Ends the mapping, when no scan will follow. Places that were seen again since the last large loop have corrected
+  // the pose at once, but not the way to there: now the path is the one that fits them all best, as a smoothing job
+  // would find it from this robot alone. Pose, landmarks and map follow. If the map is still being drawn again, draws
+  // the rest. Takes as long as a job: up to a second for thousands of keyframes.
   void FinishMap();
   // Replaces the grid by the result of a finished job, drawn when there had been `keyframes` keyframes
   // (keyframes_made). `path` holds the poses of those with these `numbers` in it (none: 0, 1, 2, ...): path, particles,

@@ -118,6 +118,8 @@ struct Mapper::State {
   void CloseLargeLoop();
   void RetireKeyframes();
   void Follow(std::span<const Pose2> first_poses, std::uint64_t made);
+  void MoveTo(std::span<const Pose2> path, const Pose2& T_map_last);
+  void SettlePath();
   [[nodiscard]] std::vector<Pose2> PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
                                                 std::span<const std::uint64_t> numbers) const;
   void KeepShape(std::span<const Pose2> path, std::size_t known);
