@@ -66,6 +66,8 @@ class Server {
   void SetReceiving(std::chrono::nanoseconds busy_with_one) { receiving_ns_ = busy_with_one.count(); }
   // What `cairn ros2 doctor` says.
   void SetRos2(Ros2Report&& report) { desk_.SetRos2(std::move(report)); }
+  // How many maps robots are localised in, in memory: those that are localised in the same one share it.
+  [[nodiscard]] std::size_t known_maps() const { return roster_.known_grids().size(); }
   // Scans of streams without a session, beyond the first robots.max_unclaimed streams. They are in no ledger.
   [[nodiscard]] std::uint64_t uncounted_scans() const { return roster_.unclaimed_overflow(); }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "client/cli/commands.h"
+#include "client/cli/edit_warning.h"
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
@@ -71,8 +72,13 @@ ExitCode AddEdit(Program& program, const DrawnEditArguments& arguments) {
     const Eigen::Vector2d &a = arguments.box[0], &b = arguments.box[1];
     edit.points_map = {a, {b.x(), a.y()}, b, {a.x(), b.y()}};
   }
+  // Before the edit, because a wall outside makes the map larger.
+  const auto map = program.Ask([&](QueryClient& server) { return server.Map(arguments.site); });
+  if (!map) return program.Refuse(map.error());
   const auto added = program.Ask([&](QueryClient& server) { return server.AddMapEdit(arguments.site, edit); });
   if (!added) return program.Refuse(added.error());
+  const std::string warning = EditWarning(*added, *map);
+  if (!warning.empty()) program.err() << "cairn: warning: edit " << added->id << ": " << warning << "\n";
   return program.Print(FormatEdit(*added), *added);
 }
 

@@ -10,6 +10,7 @@
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
 #include "client/lib/pose_client.h"
+#include "common/geometry/rotated_covariance.h"
 #include "common/sensor/stamp.h"
 
 namespace cairn::client {
@@ -28,9 +29,7 @@ struct PoseArguments {
 void MoveInto(PoseReport& pose, const Pose2& T_map_frame) {
   pose.T_map_robot = Between(T_map_frame, pose.T_map_robot);
   pose.T_map_odom = Between(T_map_frame, pose.T_map_odom);
-  Eigen::Matrix3d R_frame_map = Eigen::Matrix3d::Identity();
-  R_frame_map.topLeftCorner<2, 2>() = T_map_frame.Inverse().rotation();
-  pose.covariance = R_frame_map * pose.covariance * R_frame_map.transpose();
+  pose.covariance = Rotated(pose.covariance, -T_map_frame.theta);
 }
 
 ExitCode AskPose(Program& program, const PoseArguments& arguments) {

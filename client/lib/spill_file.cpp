@@ -4,9 +4,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <system_error>
 #include <utility>
+
+#include "common/file/number_bytes.h"
 
 namespace cairn::client {
 namespace {
@@ -59,9 +60,7 @@ SpillFile::~SpillFile() {
 }
 
 Result<std::uint64_t> SpillFile::Append(std::string_view record) {
-  const auto length = static_cast<std::uint32_t>(record.size());
-  std::string bytes(sizeof(length), '\0');
-  std::memcpy(bytes.data(), &length, sizeof(length));
+  std::string bytes = BytesOfNumber(static_cast<std::uint32_t>(record.size()));
   bytes += record;
   if (!WriteAll(file_, bytes, size_)) {
     return Fail(StatusCode::kUnavailable, path_ + ": cannot be written: " + ErrnoText(errno));

@@ -180,7 +180,8 @@ Result<RelocaliseJob::SiteMap> RelocaliseJob::MapOf(const Site& site) const {
   const auto snapshot = site.snapshot();
   const MapInfo& info = snapshot->info;
   SiteMap map{{false, TilesToLocaliseIn(*snapshot), info.resolution_m, info.epoch}, nullptr};
-  map.grid = KnownGridOf(map.tiles.tiles, info.resolution_m, info.epoch, site_.place, site_.self_check.near_m);
+  map.grid = KnownGridOf(map.tiles.tiles, info.resolution_m, info.epoch, site_.place, site_.self_check.near_m,
+                         &roster_.known_grids());
   if (map.grid == nullptr)
     return Fail(StatusCode::kFailedPrecondition, "the map of site '" + info.site + "' is too large for a search");
   if (map.grid->Index()->surfaces.empty())

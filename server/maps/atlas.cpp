@@ -9,6 +9,7 @@
 #include <random>
 #include <utility>
 
+#include "server/maps/memory_shares.h"
 #include "server/store/site_contents.h"
 
 namespace cairn::server {

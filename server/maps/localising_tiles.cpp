@@ -47,7 +47,7 @@ std::vector<TileSet::TilePtr> TilesNear(std::span<const TileSet::TilePtr> tiles,
 
 std::shared_ptr<const slam::KnownGrid> KnownGridOf(std::span<const TileSet::TilePtr> tiles, double resolution_m,
                                                    std::uint32_t epoch, const slam::PlaceSearchOptions& options,
-                                                   double near_m) {
+                                                   double near_m, SharedKnownGrids* shared) {
   slam::KnownGrid::Source source{{}, resolution_m, epoch};
   for (const TileSet::TilePtr& tile : tiles) {
     if (auto cells = DecodeCells(tile->bytes, tile->encoding))
@@ -55,6 +55,7 @@ std::shared_ptr<const slam::KnownGrid> KnownGridOf(std::span<const TileSet::Tile
                            std::make_shared<const TileCells>(std::move(*cells)));
   }
   if (!slam::KnownGrid::IsBounded(source)) return nullptr;
+  if (shared != nullptr) return shared->Make(std::move(source), options, near_m);
   return std::make_shared<const slam::KnownGrid>(std::move(source), options, near_m);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/maps/map_snapshot.h"
+#include "server/maps/shared_known_grids.h"
 #include "server/slam/known_grid/known_grid.h"
 
 namespace cairn::server {
@@ -18,10 +19,11 @@ namespace cairn::server {
 [[nodiscard]] std::vector<TileSet::TilePtr> TilesNear(std::span<const TileSet::TilePtr> tiles, double resolution_m,
                                                       const Eigen::Vector2d& p_map, double reach_m);
 // The map that tiles of level 0 show. Tiles that cannot be read are left out. Null: it is larger than a search allows
-// (slam::KnownGrid::IsBounded). `near_m`: as slam::SelfCheckOptions.
+// (slam::KnownGrid::IsBounded). `near_m`: as slam::SelfCheckOptions. `shared`: where the same map may be already; null:
+// it is made.
 [[nodiscard]] std::shared_ptr<const slam::KnownGrid> KnownGridOf(std::span<const TileSet::TilePtr> tiles,
                                                                  double resolution_m, std::uint32_t epoch,
-                                                                 const slam::PlaceSearchOptions& options,
-                                                                 double near_m);
+                                                                 const slam::PlaceSearchOptions& options, double near_m,
+                                                                 SharedKnownGrids* shared = nullptr);
 
 }  // namespace cairn::server

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/maps/answer_once.h"
+#include "server/maps/memory_shares.h"
 #include "server/maps/tile_encoding.h"
 
 namespace cairn::server {
@@ -24,8 +25,7 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
       joint_(options.past_probability),
       edits_(resolution_m, static_cast<std::size_t>(options.max_edits)),
       versions_(static_cast<std::size_t>(options.max_versions)),
-      memory_limit_(BytesOfMib(options.max_memory_mib)),
-      memory_is_limited_(options.max_memory_mib > 0.0 || options.max_total_memory_mib > 0.0),
+      memory_(BytesOfMib(options.max_memory_mib), options.max_memory_mib > 0.0 || options.max_total_memory_mib > 0.0),
       epoch_(beginning.epoch),
       tile_version_(beginning.tile_version),
       map_frame_(beginning.map_frame) {
@@ -136,8 +136,7 @@ void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {
       site.RemoveOldVersions();
       site.StoreSite();
     });
-    site.version_added_ = Clock::now();
-    site.CountSoon();
+    site.memory_.NoteNewVersion(Clock::now());
     site.Refresh({}, {}, false);
     site.Send();
     done(number);
@@ -229,7 +228,7 @@ void Site::Probe(std::function<void()> done) {
 
 void Site::Render() {
   const std::vector<TileKey> changed = joint_.Render(), differing = RenderDisagreement();
-  if (!changed.empty() || !differing.empty() || info_changed_ || MemoryIsToBeCounted())
+  if (!changed.empty() || !differing.empty() || info_changed_ || memory_.IsToBeCounted(Clock::now()))
     Refresh(changed, differing, false);
 }
 
@@ -271,8 +270,8 @@ void Site::Refresh(const std::vector<TileKey>& changed, const std::vector<TileKe
   after->disagreement = before->disagreement.With(Encoded(differing, joint_.disagreement(), before->disagreement, all));
   after->info = InfoOf(after->tiles);
   CountMemory(*after);
-  after->info.memory_bytes = memory_bytes_;
-  after->info.memory_note = memory_note_;
+  after->info.memory_bytes = memory_.bytes();
+  after->info.memory_note = memory_.note();
   info_changed_ = true;
   const MutexLock lock(mutex_);
   snapshot_ = std::move(after);

@@ -36,7 +36,7 @@
 #include "server/maps/map_snapshot.h"
 #include "server/maps/map_versions.h"
 #include "server/maps/maps_options.h"
-#include "server/maps/memory_shares.h"
+#include "server/maps/memory_keeper.h"
 #include "server/ops/heartbeat.h"
 #include "server/ops/start_control.h"
 #include "server/outbound.h"
@@ -165,16 +165,13 @@ class Site : public std::enable_shared_from_this<Site> {
   void AskPartOf(SessionId session, int level, SnapshotDone done);
   // Of all sites together (memory_shares.h); 0: no limit. `clearly_below`: all together take clearly less than they
   // may. Thread rule: any thread.
-  void SetMemoryShare(std::uint64_t bytes, bool clearly_below) {
-    memory_share_ = bytes;
-    total_clearly_below_ = clearly_below;
-  }
+  void SetMemoryShare(std::uint64_t bytes, bool clearly_below) { memory_.SetShare(bytes, clearly_below); }
   // The map takes more memory than it may, and nothing is left that it could give up. So it is called until it takes
   // clearly less (memory_shares.h). Thread rule: any thread.
-  [[nodiscard]] bool gives_no_more() const { return gives_no_more_; }
+  [[nodiscard]] bool gives_no_more() const { return memory_.gives_no_more(); }
   // A session that has ended and that the site can do without, because others have drawn all of its area; 0: none. It
   // may be removed, if no robot goes on with it: then Leave is called. Thread rule: any thread.
-  [[nodiscard]] SessionId spare_session() const { return spare_session_; }
+  [[nodiscard]] SessionId spare_session() const { return memory_.spare_session(); }
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 
@@ -188,6 +185,7 @@ class Site : public std::enable_shared_from_this<Site> {
 
  private:
   class Ticket;
+  class GivesUp;
   struct Drawing {
     slam::OccupancyGrid::Chunks chunks;  // A null chunk: removed.
     slam::OccupancyGrid::Looks looks;
@@ -216,18 +214,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void RenderAll();
   [[nodiscard]] std::vector<TileKey> RenderDisagreement();
   void CountMemory(const MapSnapshot& snapshot) noexcept;
-  [[nodiscard]] bool MemoryIsToBeCounted() const;
-  void CountSoon();
   void StayWithinMemory(Clock::time_point now);
-  [[nodiscard]] std::uint64_t MemoryLimit() const;
-  void NoteLimits(bool is_above);
-  [[nodiscard]] std::string MemoryNote(bool above) const;
-  enum class GaveUp { kSomething, kLaterPerhaps, kNothing };
-  GaveUp GiveUpLeastNeeded(Clock::time_point now);
-  bool GiveUpVersion(bool last);
-  bool GiveUpLayer();
-  bool OfferSpareSession(Clock::time_point now);
-  void NoteLeft(SessionId session);
   [[nodiscard]] std::vector<TileKey> DropDisagreement();
   void ExpireDisagreement(Clock::time_point now);
   // Stores what people have said about the map, and publishes it. Returns its version.
@@ -284,8 +271,7 @@ class Site : public std::enable_shared_from_this<Site> {
   MapEdits edits_;
   DrawnPaths paths_;  // Of sessions that are shown, as far as they are known.
   MapVersions versions_;
-  const std::uint64_t memory_limit_;  // Bytes; 0: none.
-  const bool memory_is_limited_;      // By this, or with that of all other sites.
+  MemoryKeeper memory_;
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;
   std::map<SessionId, Member> members_;
@@ -305,24 +291,10 @@ class Site : public std::enable_shared_from_this<Site> {
   std::set<TileKey> unsent_;          // Tiles (or tombstones) to publish.
   // Until then the layer of disagreement is kept up to date.
   std::optional<Clock::time_point> disagreement_wanted_;
-  std::optional<std::chrono::steady_clock::time_point> memory_counted_;
-  std::uint64_t memory_bytes_ = 0;  // As counted then, ...
-  bool memory_changed_ = false;     // ... and whether the map has changed since.
-  GivenUp given_up_;
-  bool disagreement_given_up_ = false;
-  bool above_own_ = false, above_share_ = false;  // Above which limits the map is called.
-  std::string memory_note_;
-  std::set<SessionId> offered_;                  // As spare_session, in this round.
-  std::optional<Clock::time_point> next_offer_;  // Not before.
-  std::optional<Clock::time_point> version_added_;
 
   std::atomic<bool> lost_part_{false}, loading_{false};
   std::set<SessionId> stored_members_;  // Set by Restore, before others know the site.
   std::atomic<std::uint64_t> map_frame_;
-  std::atomic<std::uint64_t> memory_share_{0};
-  std::atomic<bool> total_clearly_below_{true};
-  std::atomic<bool> gives_no_more_{false};
-  std::atomic<SessionId> spare_session_{0};
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.
   mutable Mutex mutex_;

@@ -45,7 +45,7 @@ void Site::KeepAsLayer(SessionId session) {
     layers_.erase(session);
   }
   RemoveOtherLayers();
-  NoteLeft(session);
+  memory_.NoteLeft(session);
   StoreSite();
 }
 

@@ -79,7 +79,7 @@ void Site::StoreSite() {
                     .edits = *edits_.all(),
                     .edits_version = edits_.version(),
                     .anchors = edits_.anchors(),
-                    .given_up = given_up_,
+                    .given_up = memory_.given_up(),
                     .chosen = chosen_};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
@@ -120,8 +120,7 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
   merged_ = stored.merged;
-  given_up_ = stored.given_up;
-  memory_note_ = MemoryNote(false);
+  memory_.Restore(stored.given_up);
   chosen_ = stored.chosen;
   const std::size_t left_out = edits_.Restore(
       stored.edits, stored.edits_version, [&control] { control.Advance(); }, stored.anchors);

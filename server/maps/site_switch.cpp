@@ -105,7 +105,7 @@ void Site::CommitIfComplete() {
     switches_[++epoch_] = generation_;
     while (switches_.size() > kMostSwitches) switches_.erase(switches_.begin());
     for (const std::uint32_t version : changed) StoreVersion(version);
-    CountSoon();
+    memory_.CountSoon();
     RenderAll();
   });
   *complete.completed = true;

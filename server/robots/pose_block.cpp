@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/geometry/rotated_covariance.h"
 #include "common/sensor/stamp.h"
 
 namespace cairn::server {
@@ -37,9 +38,7 @@ void PathMove::Move(PathPose& pose, At after) const {
     pose.T_map_robot = Interpolate(before.T_new_old * old, after->T_new_old * old, fraction);
   }
   pose.T_map_odom = pose.T_map_robot * Between(old, pose.T_map_odom);
-  Eigen::Matrix3f R = Eigen::Matrix3f::Identity();
-  R.topLeftCorner<2, 2>() = Pose2{0.0, 0.0, pose.T_map_robot.theta - old.theta}.rotation().cast<float>();
-  pose.covariance = (R * pose.covariance * R.transpose()).eval();
+  pose.covariance = Rotated(pose.covariance, pose.T_map_robot.theta - old.theta);
 }
 
 bool PathMove::Changes(Stamp first, Stamp last) const {

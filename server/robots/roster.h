@@ -34,6 +34,7 @@
 #include "common/delay_meter.h"
 #include "common/mutex.h"
 #include "server/maps/atlas.h"
+#include "server/maps/shared_known_grids.h"
 #include "server/ops/start_control.h"
 #include "server/outbound.h"
 #include "server/robots/robots_options.h"
@@ -100,6 +101,8 @@ class Roster {
   [[nodiscard]] std::vector<std::shared_ptr<Session>> All() const;
   // All sessions that draw the site, also the earlier ones of its robots.
   [[nodiscard]] std::vector<std::shared_ptr<Session>> InSite(const std::string& site) const;
+  // The maps in which robots are localised.
+  [[nodiscard]] SharedKnownGrids& known_grids() const { return *known_grids_; }
   [[nodiscard]] std::uint64_t unclaimed_overflow() const;
   // How long the robots' work has waited for a thread, over the last turns of all sessions.
   [[nodiscard]] DelayMeter::Quantiles waits() const;
@@ -172,6 +175,7 @@ class Roster {
   Outbound& outbound_;
   Atlas& atlas_;
   Journal* const journal_;
+  const std::shared_ptr<SharedKnownGrids> known_grids_ = std::make_shared<SharedKnownGrids>();
   // The roster is being destroyed. Sessions that are destroyed now stay in the store.
   const std::shared_ptr<std::atomic<bool>> closing_ = std::make_shared<std::atomic<bool>>(false);
   // Sessions may outlive the roster.

@@ -144,7 +144,8 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
                            .estimator = {.mapper = mapper,
                                          .T_map_robot_start = StartOf(stored.request),
                                          .fragment = stored.fragment,
-                                         .map_begun = stored.map_begun},
+                                         .map_begun = stored.map_begun,
+                                         .known_grids = known_grids_},
                            .quiet_since_ms = stored.quiet_since_ms};
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },

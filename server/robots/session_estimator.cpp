@@ -66,6 +66,7 @@ SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& r
       epoch_(record.epoch()),
       fragment_(setup.fragment),
       options_(setup.mapper),
+      known_grids_(setup.known_grids),
       map_begun_(setup.map_begun),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
@@ -285,7 +286,8 @@ bool SessionEstimator::Localise(LocaliseTaken&& taken) {
   std::shared_ptr<const slam::KnownGrid> map;
   if (!taken.maps_again) {
     const auto known_grid = [&](std::span<const TileSet::TilePtr> tiles, double resolution_m) {
-      return KnownGridOf(tiles, resolution_m, taken.epoch, options_.recovery.place, options_.self_check.near_m);
+      return KnownGridOf(tiles, resolution_m, taken.epoch, options_.recovery.place, options_.self_check.near_m,
+                         known_grids_.get());
     };
     map = known_grid(taken.tiles, taken.resolution_m);
     if (map == nullptr) map = known_grid({}, options_.grid.resolution_m);
@@ -351,6 +353,7 @@ void SessionEstimator::On(Finish&& finish) {
   if (!ended_ && !goes_on) {
     if (finish.final) Store(SessionFinished{true, finish.reason});
     pipeline_.Finish();
+    if (finish.final) FinishMap();
     RefreshLandmarks(true);
     ended_ = finish.final;
     if (ended_) pipeline_.mapper().ForgetSuggestion();

@@ -13,6 +13,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "server/maps/shared_known_grids.h"
 #include "server/outbound.h"
 #include "server/robots/checkpoint_pace.h"
 #include "server/robots/robot_event.h"
@@ -58,6 +59,8 @@ struct EstimatorSetup {
   // own, and it is not localized, until a map version joins it (maps/robot_grid.h).
   bool fragment = false;
   bool map_begun = false;  // Others had begun the map at the opening, so that it matters where the robot starts.
+  // Maps that several robots are localised in; null: the session makes its own.
+  std::shared_ptr<SharedKnownGrids> known_grids = {};
 };
 
 class SessionEstimator {
@@ -144,6 +147,7 @@ class SessionEstimator {
   // Returns false if the grid stays as it was, because the path cannot follow.
   bool AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
   void FollowPath(std::optional<bool> fragment);
+  void FinishMap();
   void SetEpoch(std::uint32_t epoch);
   void Drive(const Pose2& T_map_robot);
   void TellJoining();
@@ -154,6 +158,7 @@ class SessionEstimator {
   std::uint32_t epoch_ = 0;
   bool fragment_ = false;
   const slam::MapperOptions options_;
+  const std::shared_ptr<SharedKnownGrids> known_grids_;
   std::string start_refused_;  // Why, if it was.
   const bool map_begun_;
   // Number and stamp of the first scan that arrived, until one is used.

@@ -2,6 +2,7 @@
 #include <utility>
 #include <variant>
 
+#include "common/file/number_bytes.h"
 #include "server/maps/stored_grid.h"
 #include "server/robots/session_estimator.h"
 
@@ -9,20 +10,6 @@ namespace cairn::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string BytesOfNumber(std::uint64_t number) {
-  std::string bytes;
-  for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(number >> (8 * i)));
-  return bytes;
-}
-
-std::optional<std::uint64_t> TakeNumber(std::string_view& bytes) {
-  if (bytes.size() < 8) return std::nullopt;
-  std::uint64_t number = 0;
-  for (std::size_t i = 0; i < 8; ++i) number |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
-  bytes.remove_prefix(8);
-  return number;
-}
 
 // The main part of a checkpoint: of the session, with the number of its pieces, and of the estimator.
 struct CheckpointParts {
@@ -34,11 +21,11 @@ struct CheckpointParts {
 Result<CheckpointParts> PartsOf(std::string_view main) {
   const auto too_short = [] { return Fail(StatusCode::kDataLoss, "a checkpoint is too short"); };
   CheckpointParts parts;
-  const auto size = TakeNumber(main);
+  const auto size = TakeNumber<std::uint64_t>(main);
   if (!size || *size > main.size()) return too_short();
   parts.session = main.substr(0, *size);
   main.remove_prefix(parts.session.size());
-  const auto pieces = TakeNumber(main);
+  const auto pieces = TakeNumber<std::uint64_t>(main);
   if (!pieces) return too_short();
   parts.session_pieces = *pieces;
   parts.estimator = main;
@@ -105,8 +92,8 @@ Journal::Content SessionEstimator::Save() const {
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Main();
-    CheckpointContent content{BytesOfNumber(own.size()) + own + BytesOfNumber(writer->pieces().size()) +
-                              pipeline->Main()};
+    CheckpointContent content{BytesOfNumber(std::uint64_t{own.size()}) + own +
+                              BytesOfNumber(std::uint64_t{writer->pieces().size()}) + pipeline->Main()};
     for (const auto* const pieces : {&writer->pieces(), &pipeline->pieces()})
       for (const slam::StatePiece& piece : *pieces)
         content.pieces.push_back({piece.value, [piece] { return piece.Bytes(); }});
@@ -143,6 +130,8 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  if (const auto map = pipeline_.mapper().known_map(); map != nullptr && known_grids_ != nullptr)
+    pipeline_.mapper().ShareKnownMap(known_grids_->SameAs(map));
   record_.SetLearned(pipeline_.mapper().learned());
   ended_ = record_.phase() == SessionPhase::kEnded;
   record_.SetLocalises(pipeline_.mapper().localises());

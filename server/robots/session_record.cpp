@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/geometry/rotated_covariance.h"
 #include "common/wall_clock.h"
 #include "server/inbound.h"
 
@@ -213,14 +214,12 @@ void SessionRecord::SetEpoch(std::uint32_t epoch) {
 }
 
 void SessionRecord::MoveLast(const Pose2& T_new_old) {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_new_old.rotation();
   const MutexLock lock(mutex_);
   hypotheses_.clear();
   PoseReport& pose = status_.pose;
   pose.T_map_robot = T_new_old * pose.T_map_robot;
   pose.T_map_odom = T_new_old * pose.T_map_odom;
-  pose.covariance = R * pose.covariance * R.transpose();
+  pose.covariance = Rotated(pose.covariance, T_new_old.theta);
 }
 
 void SessionRecord::MovePath(std::span<const StampedPose> now, bool moves_rest, std::optional<bool> fragment) {

@@ -105,6 +105,19 @@ std::string RobotStream::WhyOtherClock(Clock::time_point now, Stamp server_clock
   return {};
 }
 
+// A lidar that looks all around turns, unless it is simulated. Many drivers do not say how.
+std::vector<std::string> RobotStream::BeamTimesInDoubt(Clock::time_point now) const {
+  std::vector<std::string> doubts;
+  for (const auto& [topic, lidar] : lidars_) {
+    if (!lidar.round_at_once || now - lidar.received > kSilent) continue;
+    doubts.push_back(topic +
+                     ": time_increment is 0, so all its beams count as measured at once. If the lidar turns, the map "
+                     "is less exact wherever the robot turns: let its driver fill time_increment "
+                     "(`cairn-calibrate laser` measures the turn in a recording)");
+  }
+  return doubts;
+}
+
 bool RobotStream::OthersPublishMapToOdom(Clock::time_point now, const std::set<ros2::WriterId>& others) const {
   return std::any_of(map_to_odom_.begin(), map_to_odom_.end(), [&](const auto& one) {
     const auto& [writer, said] = one;
@@ -135,6 +148,7 @@ std::vector<std::string> RobotStream::Problems(Clock::time_point now, Stamp serv
                        " (its localisation, such as AMCL or slam_toolbox, has to be stopped)");
   }
   add(WhyOtherClock(now, server_clock));
+  for (std::string& doubt : BeamTimesInDoubt(now)) add(std::move(doubt));
   return problems;
 }
 

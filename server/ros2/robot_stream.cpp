@@ -8,6 +8,7 @@
 #include <random>
 #include <utility>
 
+#include "common/geometry/angle.h"
 #include "common/service/start_pose.h"
 #include "server/ingress/admission.h"
 
@@ -20,6 +21,7 @@ constexpr std::chrono::seconds kTryAgain{1};         // After a refusal that wil
 constexpr std::chrono::seconds kTryLater{5};         // After any other.
 constexpr std::size_t kMaxEarly = 64;                // Odometry samples kept for the first scan of a session.
 constexpr std::size_t kMostMapToOdom = 16;           // Publishers of it that are remembered, the newest ones.
+constexpr double kRoundRad = 1.5 * kPi;              // A scan of more than that has to be measured by turning.
 constexpr const char* kOdometrySensor = "odometry";  // As on the native wire.
 
 // A random number other than 0, as clients of the native wire draw it.
@@ -78,6 +80,8 @@ void RobotStream::Take(const std::string& topic, ros2::LaserScan&& message, cons
   const bool is_new = !lidar.stamp;
   lidar.stamp = message.header.stamp;
   lidar.received = now;
+  lidar.round_at_once = message.time_increment == 0.0 &&
+                        std::abs(message.angle_increment) * static_cast<double>(message.ranges.size()) > kRoundRad;
   if (message.header.frame != lidar.frame) {
     lidar.frame = message.header.frame;
     lidar.frames_version = 0;

@@ -98,6 +98,8 @@ class RobotStream {
     std::uint64_t frames_version = 0;
     std::optional<Stamp> stamp;
     Clock::time_point received{};
+    // Its last scan goes round, and says that all beams were measured at once.
+    bool round_at_once = false;
   };
 
   Lidar& LidarOf(const std::string& topic);
@@ -115,6 +117,7 @@ class RobotStream {
   void Send(const Odometry& odometry, const ros2::Origin& origin);
   [[nodiscard]] bool odometry_is_fresh(Clock::time_point now) const;
   [[nodiscard]] std::string WhyNoOdometry(Clock::time_point now) const;
+  [[nodiscard]] std::vector<std::string> BeamTimesInDoubt(Clock::time_point now) const;
   [[nodiscard]] std::vector<std::string> ProblemsOfScans(Clock::time_point now) const;
   [[nodiscard]] std::string WhyNoSession() const;
   [[nodiscard]] std::string WhyNoPose(Clock::time_point now) const;

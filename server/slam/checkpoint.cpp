@@ -1,7 +1,6 @@
 #include "server/slam/checkpoint.h"
 
 #include <algorithm>
-#include <cstring>
 #include <functional>
 #include <map>
 #include <optional>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "common/file/checksum.h"
+#include "common/file/number_bytes.h"
 #include "common/options/number_text.h"
 
 namespace cairn::slam {
@@ -17,19 +17,6 @@ namespace {
 
 constexpr std::string_view kMagic = "CAIRNEST";
 constexpr std::string_view kChecksum = " with the checksum ";  // Between a known map and its checksum.
-
-template <typename Number>
-void AppendNumber(std::string& bytes, Number number) {
-  bytes.append(reinterpret_cast<const char*>(&number), sizeof(number));
-}
-
-template <typename Number>
-bool TakeNumber(std::string_view& bytes, Number& number) {
-  if (bytes.size() < sizeof(number)) return false;
-  std::memcpy(&number, bytes.data(), sizeof(number));
-  bytes.remove_prefix(sizeof(number));
-  return true;
-}
 
 // Writes every option as a line `key value`.
 class OptionLines final : public OptionVisitor {
@@ -73,7 +60,7 @@ std::string TextOf(MapperOptions options) {
   // A file may hold another map under the same name.
   std::string numbers;
   for (const MapLine& line : *options.filter.line_match.map)
-    for (const double number : {line.a.x(), line.a.y(), line.b.x(), line.b.y()}) AppendNumber(numbers, number);
+    for (const double number : {line.a.x(), line.a.y(), line.b.x(), line.b.y()}) numbers += BytesOfNumber(number);
   return text + "slam.line_match.map" + std::string(kChecksum) + std::to_string(ChecksumOf(numbers)) + '\n';
 }
 
@@ -187,16 +174,17 @@ Result<Parts> PartsOf(std::string_view bytes) {
   };
   if (bytes.substr(0, kMagic.size()) != kMagic) return damaged("it does not begin as one");
   bytes.remove_prefix(kMagic.size());
-  std::uint32_t format = 0;
-  std::uint64_t checksum = 0, length = 0;
-  if (!TakeNumber(bytes, format)) return damaged("it is too short");
-  if (format < kOldestCheckpointFormat || format > kCheckpointFormat)
-    return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
-                "the checkpoint has format " + std::to_string(format) + ", this program reads " +
+  const auto format = TakeNumber<std::uint32_t>(bytes);
+  if (!format) return damaged("it is too short");
+  if (*format < kOldestCheckpointFormat || *format > kCheckpointFormat)
+    return Fail(*format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
+                "the checkpoint has format " + std::to_string(*format) + ", this program reads " +
                     std::to_string(kOldestCheckpointFormat) + " to " + std::to_string(kCheckpointFormat));
-  if (!TakeNumber(bytes, checksum) || checksum != ChecksumOf(bytes)) return damaged("its checksum is wrong");
-  if (!TakeNumber(bytes, length) || length > bytes.size()) return damaged("it is too short");
-  return Parts{std::string(bytes.substr(0, length)), {bytes.substr(length), format}};
+  const auto checksum = TakeNumber<std::uint64_t>(bytes);
+  if (!checksum || *checksum != ChecksumOf(bytes)) return damaged("its checksum is wrong");
+  const auto length = TakeNumber<std::uint64_t>(bytes);
+  if (!length || *length > bytes.size()) return damaged("it is too short");
+  return Parts{std::string(bytes.substr(0, *length)), {bytes.substr(*length), *format}};
 }
 
 }  // namespace
@@ -213,13 +201,12 @@ std::string Checkpoint::Main() const {
 }
 
 std::string Checkpoint::With(const std::string& state) const {
-  std::string checked;
-  AppendNumber(checked, static_cast<std::uint64_t>(options_.size()));
+  std::string checked = BytesOfNumber(static_cast<std::uint64_t>(options_.size()));
   checked += options_;
   checked += state;
   std::string bytes(kMagic);
-  AppendNumber(bytes, kCheckpointFormat);
-  AppendNumber(bytes, ChecksumOf(checked));
+  bytes += BytesOfNumber(kCheckpointFormat);
+  bytes += BytesOfNumber(ChecksumOf(checked));
   return bytes + checked;
 }
 

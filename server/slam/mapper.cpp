@@ -289,6 +289,7 @@ MapperSnapshot Mapper::Snapshot() const {
 }
 
 void Mapper::FinishMap() {
+  state_->SettlePath();
   state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 

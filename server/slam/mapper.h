@@ -107,7 +107,10 @@ class Mapper {
   [[nodiscard]] const std::vector<Pose2>& drawn_path() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
-  // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
+  // Ends the mapping, when no scan will follow. Places that were seen again since the last large loop have corrected
+  // the pose at once, but not the way to there: now the path is the one that fits them all best, as a smoothing job
+  // would find it from this robot alone. Pose, landmarks and map follow. If the map is still being drawn again, draws
+  // the rest. Takes as long as a job: up to a second for thousands of keyframes.
   void FinishMap();
   // Replaces the grid by the result of a finished job, drawn when there had been `keyframes` keyframes
   // (keyframes_made). `path` holds the poses of those with these `numbers` in it (none: 0, 1, 2, ...): path, particles,
@@ -158,6 +161,10 @@ class Mapper {
   [[nodiscard]] bool localises() const;
   // The epoch of the map in which it is localised; nothing if it maps.
   [[nodiscard]] std::optional<std::uint32_t> known_map_epoch() const;
+  // That map, null if it maps; and a copy of it that others use, too (KnownGrid::IsSameAs), in its place. A mapper
+  // whose state was read has a map of its own.
+  [[nodiscard]] std::shared_ptr<const KnownGrid> known_map() const;
+  void ShareKnownMap(std::shared_ptr<const KnownGrid> same);
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
   // The best path by stamps: where the robot was at the first of the scans that were seen from each keyframe. Empty

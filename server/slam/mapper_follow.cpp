@@ -41,12 +41,29 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
   } else {
     FitRest(path, known);
   }
+  MoveTo(path, before.back());
+}
+
+// Everything that hangs on the path follows it; `T_map_last` was its last pose.
+void Mapper::State::MoveTo(std::span<const Pose2> path, const Pose2& T_map_last) {
   filter->MoveTo(path);
   self_check.Forget();
-  const Pose2 T_new_old = path.back() * before.back().Inverse();
+  const Pose2 T_new_old = path.back() * T_map_last.Inverse();
   recovery.Move(T_new_old);
   level.outcome.T_map_robot = T_new_old * level.outcome.T_map_robot;
   level.outcome.T_map_odom = T_new_old * level.outcome.T_map_odom;
+}
+
+// Places that were seen again correct the pose at once, and the way to them when the next large loop closes. No other
+// one will.
+void Mapper::State::SettlePath() {
+  const std::vector<PoseRelation> relations = trail.relations();
+  if (localisation || !filter->rebases() || !filter->placed() || relations.empty()) return;
+  std::vector<Pose2> path = believed_path().values();
+  const Pose2 T_map_last = path.back();
+  if (!options.pose_graph.enabled || !OptimisePoses(path, relations, options.pose_graph).usable) return;
+  MoveTo(path, T_map_last);
+  drawing.StartAgain(trail.made());
 }
 
 // A job may know more than the relations of this robot, such as what others have seen. Where it has changed the path,

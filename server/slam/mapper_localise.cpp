@@ -69,9 +69,9 @@ std::optional<SceneAgreement> Mapper::State::BeforeCarriedInMap(const Scan& scan
                                                                 const std::vector<SurfacePoint>& points_robot,
                                                                 const TrackStep& step) const {
   if (!options.self_check.enabled || localisation->looking() || !last_scan) return std::nullopt;
-  if (!MayBeCarried(level.outcome.score, step.score)) return std::nullopt;
+  if (!MayBeCarried(LastScore(), step.score)) return std::nullopt;
   const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
-  const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, level.outcome.score};
+  const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, LastScore()};
   const FollowedMap followed{*localisation->map(), localisation->T_map_track()};
   const SceneAgreement before = AgreementWithMap(followed, last);
   if (!LooksCarried(followed, last, before, {scan, points_robot, step.T_track_robot, step.score})) return std::nullopt;
@@ -102,7 +102,7 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
     step = front_end.Track(view, T_odom_robot, parallel_for);
   }
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
-  level.outcome.score = step.score;
+  SetLastScore(step.score);
   const Keyframe seen{still, OdometryOrNone(T_odom_robot)};
   GridLocalisation::Followed followed = localisation->Take({seen, view.points_robot, step});
   if (step.T_track_held && !localisation->looking())
@@ -137,6 +137,14 @@ bool Mapper::localises() const {
 std::optional<std::uint32_t> Mapper::known_map_epoch() const {
   if (!state_->localisation) return std::nullopt;
   return state_->localisation->map()->source().epoch;
+}
+
+std::shared_ptr<const KnownGrid> Mapper::known_map() const {
+  return state_->localisation ? state_->localisation->map() : nullptr;
+}
+
+void Mapper::ShareKnownMap(std::shared_ptr<const KnownGrid> same) {
+  if (state_->localisation) state_->localisation->ShareMap(std::move(same));
 }
 
 }  // namespace cairn::slam

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/mapper_state.h"
 #include "server/slam/scan/beam_points.h"
 
@@ -67,9 +68,9 @@ std::optional<SceneAgreement> Mapper::State::BeforeCarried(const Scan& scan,
                                                            const std::vector<SurfacePoint>& points_robot,
                                                            const TrackStep& step) const {
   if (!options.self_check.enabled || !HasMap() || recovery.active() || !last_scan) return std::nullopt;
-  if (!MayBeCarried(level.outcome.score, step.score)) return std::nullopt;
+  if (!MayBeCarried(LastScore(), step.score)) return std::nullopt;
   const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
-  const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, level.outcome.score};
+  const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, LastScore()};
   const SceneAgreement before = AgreementWithLast(trail, last);
   if (!LooksCarried(trail, last, before, {scan, points_robot, step.T_track_robot, step.score})) return std::nullopt;
   return before;
@@ -297,9 +298,7 @@ RevisitObservation Mapper::State::SeenFromNearest(const FoundPlace& place) const
     nearest = k;
     nearest_m = distance_m;
   }
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = path[nearest].rotation().transpose();
-  return {nearest, Between(path[nearest], place.T_map_robot), R * place.covariance * R.transpose()};
+  return {nearest, Between(path[nearest], place.T_map_robot), Rotated(place.covariance, -path[nearest].theta)};
 }
 
 // The robot has been found: the path goes on there, with a step from the last keyframe that no scan or odometry shows.
@@ -316,9 +315,7 @@ ScanOutcome Mapper::State::GoOnAt(const Recovery::Found& found, Keyframe keyfram
   step.T_track_robot = T_track_robot;
   step.T_track_held.reset();
   step.found = true;
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_map_last.rotation().transpose();
-  blind.Found(R * place.covariance * R.transpose());
+  blind.Found(Rotated(place.covariance, -T_map_last.theta));
   recovery.End();
   self_check.Forget();
   Regained regained;

@@ -118,6 +118,8 @@ struct Mapper::State {
   void CloseLargeLoop();
   void RetireKeyframes();
   void Follow(std::span<const Pose2> first_poses, std::uint64_t made);
+  void MoveTo(std::span<const Pose2> path, const Pose2& T_map_last);
+  void SettlePath();
   [[nodiscard]] std::vector<Pose2> PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
                                                 std::span<const std::uint64_t> numbers) const;
   void KeepShape(std::span<const Pose2> path, std::size_t known);
@@ -172,8 +174,7 @@ struct Mapper::State {
     archive(*self.localisation);
   }
 
-  // The last scan that was reported as part of the path and was not tilted. `outcome.score` is also that of the last
-  // scan of a robot that is only localised.
+  // The last scan that was reported as part of the path and was not tilted. For `outcome.score` see LastScore.
   struct LevelScan {
     ScanOutcome outcome;
     Pose2 T_keyframe_robot;
@@ -196,6 +197,11 @@ struct Mapper::State {
       archive(self.scan, self.T_odom_robot, self.T_track_robot);
     }
   };
+
+  // How much of the last scan that was not tilted was explained. A robot that is only localised has no other outcome of
+  // its own path, so its scores take the place of that of the last scan of its path.
+  [[nodiscard]] double LastScore() const { return level.outcome.score; }
+  void SetLastScore(double score) { level.outcome.score = score; }
 
   // Whether the parts fit together after reading.
   [[nodiscard]] bool IsConsistent() const;

@@ -2,39 +2,22 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstring>
 #include <set>
 #include <system_error>
 #include <utility>
 
 #include "common/file/atomic_file.h"
+#include "common/file/number_bytes.h"
 #include "server/store/record_values.h"
 
 namespace cairn::server {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "numbers are written as they are in memory");
 
 constexpr std::string_view kMagic = "cairnste";
 constexpr std::uint64_t kHeaderBytes = 12;
 constexpr std::uint64_t kEndBytes = 16;  // After the last length.
 // Longer records are not allocated: the length is a number in a file.
 constexpr std::uint32_t kMaxBlock = 1U << 30;
-
-template <typename Number>
-std::string BytesOfNumber(Number number) {
-  std::string bytes(sizeof(Number), '\0');
-  std::memcpy(bytes.data(), &number, sizeof(Number));
-  return bytes;
-}
-
-template <typename Number>
-Number NumberOf(const char* bytes) {
-  Number number = 0;
-  std::memcpy(&number, bytes, sizeof(Number));
-  return number;
-}
 
 // Appends and adds up.
 class Writer {
@@ -218,7 +201,7 @@ Result<SiteFileReader> SiteFileReader::Open(const std::filesystem::path& path) {
   std::array<char, kHeaderBytes> header{};
   if (!reader.Take(header.data(), header.size()) || std::string_view(header.data(), kMagic.size()) != kMagic)
     return Fail(StatusCode::kDataLoss, path.string() + " is not a saved site");
-  const auto format = NumberOf<std::uint32_t>(header.data() + kMagic.size());
+  const auto format = NumberAt<std::uint32_t>(header.data() + kMagic.size());
   if (format > kSiteFileFormat) {
     return Fail(StatusCode::kFailedPrecondition, path.string() + " has format " + std::to_string(format) +
                                                      ", written by a newer program; this one reads formats up to " +
@@ -233,8 +216,8 @@ Result<void> SiteFileReader::CheckEnd() {
   std::array<char, kEndBytes> end{};
   if (!Take(end.data(), end.size())) return Damaged("it ends too early");
   checksum_.Add(std::string_view(end.data(), 8));
-  if (NumberOf<std::uint64_t>(end.data()) != records_) return Damaged("records are missing");
-  if (NumberOf<std::uint64_t>(end.data() + 8) != checksum_.value()) return Damaged("its checksum is wrong");
+  if (NumberAt<std::uint64_t>(end.data()) != records_) return Damaged("records are missing");
+  if (NumberAt<std::uint64_t>(end.data() + 8) != checksum_.value()) return Damaged("its checksum is wrong");
   if (left_ != 0) return Damaged("something follows its end");
   return {};
 }
@@ -243,7 +226,7 @@ Result<std::optional<Record>> SiteFileReader::Next() {
   std::array<char, 4> length{};
   if (!Take(length.data(), length.size())) return Damaged("it ends too early");
   checksum_.Add(std::string_view(length.data(), length.size()));
-  const auto size = NumberOf<std::uint32_t>(length.data());
+  const auto size = NumberAt<std::uint32_t>(length.data());
   if (size == 0) {
     if (auto ended = CheckEnd(); !ended) return tl::unexpected(ended.error());
     return std::nullopt;

@@ -149,5 +149,31 @@ TEST(Localise, AServerThatStartsAgainGoesOnLocalising) {
   }
 }
 
+// Also after a restart, when each has read its map from its own checkpoint.
+TEST(Localise, RobotsInTheSameMapShareIt) {
+  constexpr ClientId kOther = 10;
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 10;
+  {
+    StoredServer first(directory / "0", options);
+    WholeServer& house = *first.operator->();
+    ASSERT_NO_FATAL_FAILURE(DrawMap(house));
+    house.End("r1", kDriver);
+    ASSERT_TRUE(house.WaitPhase("r1", kDriver, SessionPhase::kEnded));
+    EXPECT_EQ(house.server().known_maps(), 0U);
+    for (const auto& [robot, client] : {std::pair{"r2", kGuest}, std::pair{"r3", kOther}}) {
+      house.Open(robot, client, "lab", TruePose(0));
+      ASSERT_TRUE(Ask(house, RequestKind::kLocalise, robot).ok());
+      house.Drive(robot, client, 0, 30);
+      EXPECT_TRUE(LastPoseOf(house, robot).localized) << robot;
+      ASSERT_TRUE(first->WaitFor([&] { return DurableScans(house, robot) == 30; }));
+    }
+    EXPECT_EQ(house.server().known_maps(), 1U);
+  }
+  StoredServer second(directory / "0", options);
+  EXPECT_EQ(second->server().known_maps(), 1U);
+}
+
 }  // namespace
 }  // namespace cairn::server::testing

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/geometry/pose_difference.h"
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/filters/revisit_innovation.h"
 #include "server/slam/motion/odometry_model.h"
 
@@ -136,14 +137,13 @@ std::vector<Pose2> ParticleSet::MoveTo(std::span<const Pose2> path) {
   RemakePaths(path.size(), SharedByAll(), [&](const PosePath& old, std::size_t k) {
     return old[k] == before[k] ? path[k] : T_new_old[k] * old[k];
   });
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_new_old.back().rotation();
+  const double turned_rad = T_new_old.back().theta;
   for (Particle& particle : particles_) {
     particle.T_map_robot = particle.path[path.size() - 1];
-    particle.covariance = R * particle.covariance * R.transpose();
+    particle.covariance = Rotated(particle.covariance, turned_rad);
   }
   errors_.MoveMap(T_new_old);
-  estimate_ = {T_new_old.back() * estimate_.T_map_robot, R * estimate_.covariance * R.transpose()};
+  estimate_ = {T_new_old.back() * estimate_.T_map_robot, Rotated(estimate_.covariance, turned_rad)};
   return T_new_old;
 }
 

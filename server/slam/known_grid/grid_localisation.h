@@ -13,6 +13,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/slam/known_grid/known_grid.h"
@@ -86,6 +87,8 @@ class GridLocalisation {
   [[nodiscard]] Place CarriedTo(const Pose2& T_odom_robot) const;
   [[nodiscard]] bool looking() const { return recovery_.active(); }
   [[nodiscard]] const std::shared_ptr<const KnownGrid>& map() const { return map_; }
+  // Another copy of the same map.
+  void ShareMap(std::shared_ptr<const KnownGrid> same) { map_ = std::move(same); }
   // The last place.
   [[nodiscard]] const Place& place() const { return last_; }
 

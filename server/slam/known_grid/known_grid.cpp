@@ -50,7 +50,7 @@ bool KnownGrid::IsBounded(const Source& source) {
 }
 
 KnownGrid::KnownGrid(Source source, const PlaceSearchOptions& options, double near_m)
-    : source_(std::move(source)), near_m_(near_m) {
+    : source_(std::move(source)), cell_scale_(options.cell_scale), near_m_(near_m) {
   std::vector<SurfacePoint> surfaces;
   for (const auto& [key, cells] : source_.tiles) {
     for (int i = 0; i < kTileArea; ++i) {
@@ -64,6 +64,21 @@ KnownGrid::KnownGrid(Source source, const PlaceSearchOptions& options, double ne
     squares_[{static_cast<int>(square.x()), static_cast<int>(square.y())}].push_back(surface);
   }
   index_ = std::make_shared<const IndexedSurfaces>(std::move(surfaces), options.cell_scale);
+}
+
+bool KnownGrid::IsMadeOf(const Source& source, double cell_scale, double near_m) const {
+  return source.epoch == source_.epoch && source.resolution_m == source_.resolution_m && cell_scale == cell_scale_ &&
+         near_m == near_m_ && std::ranges::equal(source.tiles, source_.tiles, [](const auto& a, const auto& b) {
+           return a.first == b.first && (a.second == b.second || *a.second == *b.second);
+         });
+}
+
+bool KnownGrid::IsOf(const Source& source, const PlaceSearchOptions& options, double near_m) const {
+  return IsMadeOf(source, options.cell_scale, near_m);
+}
+
+bool KnownGrid::IsSameAs(const KnownGrid& other) const {
+  return IsMadeOf(other.source_, other.cell_scale_, other.near_m_);
 }
 
 std::uint8_t KnownGrid::Cell(int x, int y) const {

@@ -34,6 +34,9 @@ class KnownGrid final : public SearchedMap {
   [[nodiscard]] static bool IsBounded(const Source& source);
   // `near_m`: as SelfCheckOptions.
   KnownGrid(Source source, const PlaceSearchOptions& options, double near_m);
+  // Whether a map made of these would be the same as this one.
+  [[nodiscard]] bool IsOf(const Source& source, const PlaceSearchOptions& options, double near_m) const;
+  [[nodiscard]] bool IsSameAs(const KnownGrid& other) const;
 
   [[nodiscard]] std::shared_ptr<const IndexedSurfaces> Index() const override { return index_; }
   [[nodiscard]] const PointIndex& surfaces() const { return index_->index; }
@@ -53,7 +56,10 @@ class KnownGrid final : public SearchedMap {
                                                double max_range_m) const;
   [[nodiscard]] std::vector<SurfacePoint> SurfacesNear(const Eigen::Vector2d& p_map, double distance_m) const;
 
+  [[nodiscard]] bool IsMadeOf(const Source& source, double cell_scale, double near_m) const;
+
   Source source_;
+  double cell_scale_;
   double near_m_;
   std::shared_ptr<const IndexedSurfaces> index_;
   std::map<std::pair<int, int>, std::vector<SurfacePoint>> squares_;  // The surfaces by squares of the plane.

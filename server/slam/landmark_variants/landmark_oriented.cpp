@@ -1,5 +1,7 @@
 #include "server/slam/landmark_variants/landmark_oriented.h"
 
+#include "common/geometry/rotated_covariance.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -56,9 +58,7 @@ void LandmarkOriented::Learn(const Pose2& T_map_robot, const Measurement& measur
 
 void LandmarkOriented::Move(const Pose2& correction) {
   mean << correction * Eigen::Vector2d(mean.head<2>()), WrapAngle(mean.z() + correction.theta);
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = correction.rotation();
-  P = R * P * R.transpose();
+  P = Rotated(P, correction.theta);
 }
 
 }  // namespace cairn::slam

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <unordered_set>
 #include <utility>
+
+#include "server/slam/loops/one_per_cell.h"
 
 namespace cairn::slam {
 namespace {
@@ -46,11 +47,9 @@ std::size_t CountBefore(std::span<const KeyframeShape> shapes, double travelled_
 
 std::vector<SurfacePoint> SurfacesOf(const Trail& trail, const Stretch& stretch, double cell_m) {
   std::vector<SurfacePoint> surfaces;
-  std::unordered_set<std::int64_t> taken;
+  OnePerCell cells(cell_m);
   ForEachSurface(trail, stretch, [&](const SurfacePoint& surface) {
-    const auto x = static_cast<std::int64_t>(std::floor(surface.p.x() / cell_m));
-    const auto y = static_cast<std::int64_t>(std::floor(surface.p.y() / cell_m));
-    if (taken.insert((x << 32) ^ (y & 0xffffffff)).second) surfaces.push_back(surface);
+    if (cells.Takes(surface.p)) surfaces.push_back(surface);
   });
   return surfaces;
 }

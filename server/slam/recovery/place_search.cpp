@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/slam/loops/one_per_cell.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -12,7 +14,7 @@ namespace {
 constexpr double kLeastOfBest = 0.5;
 
 // The surface points of the scans, one per cell, in the frame of the last scan.
-std::vector<SurfacePoint> SurfacesOf(std::span<const RecentScan> recent, double cell_m) {
+std::vector<SurfacePoint> SurfacesSeenBy(std::span<const RecentScan> recent, double cell_m) {
   std::vector<SurfacePoint> surfaces;
   OnePerCell cells(cell_m);
   for (const RecentScan& one : recent) {
@@ -48,7 +50,7 @@ std::optional<FoundPlace> PlaceSearch::FindNear(const SearchedMap& map, std::spa
 std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, const SearchedMap& map,
                                                   std::span<const RecentScan> recent) {
   if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return std::nullopt;
-  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
+  const std::vector<SurfacePoint> surfaces = SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
   const auto unique =
       FindUniquePose(surfaces, index_->pyramid, window != nullptr ? *window : index_->window, loop_.max_rival);
@@ -60,7 +62,7 @@ void PlaceSearch::Begin(const SearchedMap& map, std::span<const RecentScan> rece
                         const std::optional<Pose2>& T_map_believed) {
   search_.reset();
   if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return;
-  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
+  const std::vector<SurfacePoint> surfaces = SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return;
   search_.emplace(Search{{surfaces, index_->pyramid, index_->window, loop_.max_rival}, recent.back().T_track_robot});
   if (T_map_believed) search_->poses.LookFirstIn({*T_map_believed, options_.near_m, options_.near_rad});
@@ -70,14 +72,15 @@ std::optional<FoundPlace> PlaceSearch::End(const SearchedMap& map, std::span<con
   const Search search = *std::exchange(search_, std::nullopt);
   if (!search.poses.found()) return std::nullopt;
   const Pose2 T_map_robot = *search.poses.found() * Between(search.T_track_robot, recent.back().T_track_robot);
-  return Fit(map, recent, SurfacesOf(recent, options_.cell_scale * kSearchCellM), T_map_robot, UniquePoseCovariance());
+  return Fit(map, recent, SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM), T_map_robot,
+             UniquePoseCovariance());
 }
 
 RankedPlaces PlaceSearch::Rank(const SearchedMap& map, std::span<const RecentScan> recent, std::size_t most,
                                const std::function<bool()>& go_on) {
   RankedPlaces ranked;
   if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return ranked;
-  const auto surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
+  const auto surfaces = SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return ranked;
   const auto points = SampleOf(surfaces);
   std::vector<Exclusion> known;
@@ -101,7 +104,7 @@ const IndexedSurfaces& PlaceSearch::IndexOf(const SearchedMap& map) {
 }
 
 double PlaceSearch::ScoreAt(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot) {
-  const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
+  const auto points = SampleOf(SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM));
   const LikelihoodPyramid& pyramid = IndexOf(map).pyramid;
   const auto best = FindBestPose(points, pyramid, {T_map_robot, 2.0 * pyramid.cell_m(), 2.0 * kFoundSigmaRad}, 0.0);
   return best ? best->score : 0.0;
@@ -109,7 +112,7 @@ double PlaceSearch::ScoreAt(const SearchedMap& map, std::span<const RecentScan> 
 
 bool PlaceSearch::FitsElsewhere(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot,
                                 double score) {
-  const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
+  const auto points = SampleOf(SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM));
   const IndexedSurfaces& index = IndexOf(map);
   const Exclusion own = ApartFrom(T_map_robot);
   PoseSearch search(points, index.pyramid, index.window);

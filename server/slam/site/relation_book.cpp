@@ -68,6 +68,11 @@ void RelationBook::SetBelieved(const Pair& pair, const Believes& believes) {
   }
 }
 
+const SolvedPath* RelationBook::PathOf(std::uint64_t session) const {
+  const auto path = paths_.find(session);
+  return path == paths_.end() ? nullptr : &path->second;
+}
+
 void RelationBook::BeginJob() {
   ++job_;
   measured_ = reused_ = 0;
@@ -83,6 +88,7 @@ void RelationBook::EndJob(const std::function<bool(std::uint64_t)>& is_there) {
     changed_.insert(page->first);
     page = pages_.erase(page);
   }
+  std::erase_if(paths_, [&is_there](const auto& path) { return !is_there(path.first); });
   RemoveSurplus();
 }
 

@@ -18,6 +18,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -65,6 +66,13 @@ struct Measurement {
   }
 };
 
+// Where a job has put the keyframes of a session: T_site_robot of each, in the frame of a session by its id.
+struct SolvedPath {
+  std::uint64_t frame = 0;
+  std::vector<KeyframeId> keyframes;
+  std::vector<Pose2> path;
+};
+
 class RelationBook {
  public:
   // Two sessions, by their ids: something seen in the second was looked for in the first.
@@ -89,6 +97,12 @@ class RelationBook {
   // From now on those are believed for which `believes` says so. It is asked about each that was found.
   using Believes = std::function<bool(const Measurement& measurement)>;
   void SetBelieved(const Pair& pair, const Believes& believes);
+
+  // The last job's path of a session, from which the next one's search begins, so that what has not changed stays where
+  // it is, to the millimetre. In memory only. Null: none is known.
+  [[nodiscard]] const SolvedPath* PathOf(std::uint64_t session) const;
+  void SetPath(std::uint64_t session, SolvedPath path) { paths_[session] = std::move(path); }
+  void ForgetPath(std::uint64_t session) { paths_.erase(session); }
 
   // How many were made, and how many were used again, since BeginJob.
   [[nodiscard]] std::size_t measured() const { return measured_; }
@@ -119,6 +133,7 @@ class RelationBook {
 
   std::size_t most_;
   std::map<Pair, Page> pages_;
+  std::map<std::uint64_t, SolvedPath> paths_;  // By session.
   std::set<Pair> changed_;
   std::size_t size_ = 0;
   std::uint64_t job_ = 1;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "server/slam/loops/region.h"
-#include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
 
@@ -58,11 +57,10 @@ SessionMap::SessionMap(std::uint64_t session, const MapperSnapshot& snapshot, st
       near_m_(options.self_check.near_m),
       places_(options.place, options.loop, options.self_check, options.align) {
   for (std::size_t k = 0; k < own_path_.size(); ++k) {
-    const Scan scan = *snapshot.keyframes[k].scan;
-    trail_.Append(snapshot.keyframes[k], own_path_[k], SurfacePointsOf(PointsOf(scan), scan, options.surface),
-                  Eigen::Matrix3d::Zero(), std::nullopt);
+    // Most keyframes are not looked at again: what they show of the others is in the book.
+    trail_.Append(snapshot.keyframes[k], own_path_[k], std::nullopt, Eigen::Matrix3d::Zero(), std::nullopt);
     shared_own_path_.Append(own_path_[k]);
-    ids_.push_back({snapshot.numbers.empty() ? k : snapshot.numbers[k], scan.stamp});
+    ids_.push_back({snapshot.numbers.empty() ? k : snapshot.numbers[k], snapshot.keyframes[k].scan.stamp()});
   }
 }
 

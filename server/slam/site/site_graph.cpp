@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "server/slam/site/consistent_set.h"
@@ -107,6 +108,56 @@ void SiteGraph::Place(const std::vector<std::size_t>& group) {
         move(a.session, paths_[b.session][b.keyframe] * one.T_from_to.Inverse(), a.keyframe);
       placed = true;
     }
+  }
+}
+
+bool SiteGraph::BeginWithLastPaths(const RelationBook& book) {
+  bool all = true;
+  for (std::size_t s = 0; s < size(); ++s)
+    if (CountOf(s) > 0) all = BeginWithLastPath(s, book) && all;
+  return all;
+}
+
+// The keyframes since then follow the last one that was known. Where the session's own path is another one now, the
+// last job's is of no use.
+bool SiteGraph::BeginWithLastPath(std::size_t session, const RelationBook& book) {
+  constexpr double kSameShapeM = 0.5;
+  const SessionMap& map = *maps_[session];
+  const SessionMap& frame = *maps_[frames_[session]];
+  const SolvedPath* const last = book.PathOf(map.session());
+  const SolvedPath* const of_frame = book.PathOf(frame.session());
+  if (last == nullptr || of_frame == nullptr) return false;
+  if (last->frame != frame.session() || of_frame->frame != last->frame) return false;
+  if (of_frame->keyframes.front() != frame.id(0)) return false;  // The frame is where that one is.
+  const Pose2 T_site_last = frame.own_path().front() * of_frame->path.front().Inverse();
+  std::vector<std::optional<Pose2>> known(map.size());
+  for (std::size_t i = 0; i < last->keyframes.size(); ++i)
+    if (const auto k = map.IndexOf(last->keyframes[i])) known[*k] = T_site_last * last->path[i];
+  if (known.empty() || !known.front()) return false;
+  const std::vector<Pose2>& own = map.own_path();
+  const Pose2 T_site_own = *known.front() * own.front().Inverse();
+  std::vector<Pose2> path;
+  path.reserve(map.size());
+  for (std::size_t k = 0; k < map.size(); ++k) {
+    path.push_back(known[k] ? *known[k] : path.back() * Between(own[k - 1], own[k]));
+    if ((path[k].translation() - (T_site_own * own[k]).translation()).norm() > kSameShapeM) return false;
+  }
+  paths_[session] = std::move(path);
+  placed_in_[session] = frames_[session];
+  return true;
+}
+
+void SiteGraph::NotePaths(RelationBook& book) const {
+  for (std::size_t s = 0; s < size(); ++s) {
+    const std::uint64_t session = maps_[s]->session();
+    if (CountOf(s) == 0) {
+      book.ForgetPath(session);
+      continue;
+    }
+    SolvedPath solved{.frame = maps_[frames_[s]]->session(), .keyframes = {}, .path = paths_[s]};
+    solved.keyframes.reserve(maps_[s]->size());
+    for (std::size_t k = 0; k < maps_[s]->size(); ++k) solved.keyframes.push_back(maps_[s]->id(k));
+    book.SetPath(session, std::move(solved));
   }
 }
 

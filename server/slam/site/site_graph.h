@@ -24,6 +24,11 @@ class SiteGraph {
   void Add(std::span<const SessionRelation> relations);
   // Removes the relations between two sessions.
   void RemoveBetween(std::size_t a, std::size_t b);
+  // The search for the best paths begins where the last job has put the sessions (RelationBook::PathOf). False: some
+  // that are related to others have no such path, or not in the frame in which they are now.
+  bool BeginWithLastPaths(const RelationBook& book);
+  // Those of the next job.
+  void NotePaths(RelationBook& book) const;
   // Moves all paths to fit the relations best. False: `go_on` returned false, and the graph must not be used any more.
   [[nodiscard]] bool Solve(const GoOn& go_on);
   // Removes the relations between sessions that the paths contradict, and returns how many. They have been outvoted.
@@ -42,6 +47,7 @@ class SiteGraph {
 
  private:
   void UpdateFrames();
+  bool BeginWithLastPath(std::size_t session, const RelationBook& book);
   [[nodiscard]] std::vector<std::size_t> GroupOf(std::size_t frame) const;
   void Place(const std::vector<std::size_t>& group);
   [[nodiscard]] bool SolveGroup(const std::vector<std::size_t>& group, const GoOn& go_on);

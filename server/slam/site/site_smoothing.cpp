@@ -115,7 +115,9 @@ class Smoothing {
     }
     began_with_ = all.size();
     graph_.Add(all);
-    return all.empty() || SolveAndWithdraw();
+    if (all.empty()) return true;
+    // Solved by the last job, but for what is new.
+    return graph_.BeginWithLastPaths(book_) || SolveAndWithdraw();
   }
 
   void NoteBelieved() {
@@ -130,6 +132,7 @@ class Smoothing {
                relation->second->T_from_to == one.T_known_seen;
       });
     }
+    graph_.NotePaths(book_);
   }
 
   // Some of it may be done twice.

@@ -50,7 +50,7 @@ Common CommonWith(const DrawnMap& map, const MapperSnapshot& snapshot, const std
     if (drawn == map.keyframes.end()) break;
     const Keyframe& keyframe = snapshot.keyframes[k];
     if (drawn->number != number || !keyframe.localized || HasMoved(*drawn, path[k], map.options)) continue;
-    if (keyframe.scan->stamp != drawn->stamp) continue;
+    if (keyframe.scan.stamp() != drawn->stamp) continue;
     common.kept[k] = &*drawn;
     ++common.count;
   }
@@ -166,6 +166,7 @@ std::shared_ptr<const DrawnMap> DrawMap(const MapperSnapshot& snapshot, const st
   std::set<ChunkKey> blocks;
   if (common.map != nullptr)
     for (const ChunkKey& key : changed) AddChangedBlocks(key, Find(before, key), Find(drawn->chunks, key), blocks);
+  ScanComparison comparison(grid);
   auto one = drawn->keyframes.begin();
   for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k) {
     if (!next()) return nullptr;
@@ -173,12 +174,8 @@ std::shared_ptr<const DrawnMap> DrawMap(const MapperSnapshot& snapshot, const st
     const bool is_new = common.kept[k] == nullptr;
     if (is_new || ContainsAny(blocks, one->compared_with)) {
       const auto scan = snapshot.keyframes[k].scan.Share();
-      one->disagreement = {};
-      one->disagreement.Add(*scan, one->T_map_robot, grid);
-      if (is_new) {
-        const std::set<ChunkKey> looked_at = BlocksComparedWith(*scan, one->T_map_robot, options);
-        one->compared_with.assign(looked_at.begin(), looked_at.end());
-      }
+      one->disagreement = is_new ? comparison.Compare(*scan, one->T_map_robot, one->compared_with)
+                                 : comparison.Compare(*scan, one->T_map_robot);
     }
     ++one;
   }

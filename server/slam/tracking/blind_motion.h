@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <utility>
 
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/tracking/front_end.h"
@@ -46,9 +47,7 @@ class BlindMotion {
       covariance_ = UnmeasuredAfter(covariance_, step, T_track_keyframe, noise_);
       return;
     }
-    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    R.topLeftCorner<2, 2>() = T_track_keyframe.rotation().transpose();
-    covariance_ += R * step.forecast_covariance * R.transpose();
+    covariance_ += Rotated(step.forecast_covariance, -T_track_keyframe.theta);
   }
 
   // Returns the covariance of the motion since the last call: (x, y, theta) in the last keyframe.

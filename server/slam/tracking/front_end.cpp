@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/geometry/pose_difference.h"
+#include "common/geometry/rotated_covariance.h"
 #include "common/geometry/transform2.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
@@ -159,13 +160,11 @@ Eigen::Matrix3d FrontEnd::ForecastShare(const MatchResult& match) const {
 MatchResult FrontEnd::MatchLastKeyframe(const ScanView& view, const Guess& guess,
                                         const ParallelFor& parallel_for) const {
   const Pose2& T_track_keyframe = keyframe_.T_track_robot;
-  Eigen::Matrix3d R_track_keyframe = Eigen::Matrix3d::Identity();
-  R_track_keyframe.topLeftCorner<2, 2>() = T_track_keyframe.rotation();
   const MatchPrior prior{Between(T_track_keyframe, guess.T_track_robot),
-                         R_track_keyframe.transpose() * guess.covariance * R_track_keyframe};
+                         Rotated(guess.covariance, -T_track_keyframe.theta)};
   MatchResult match = matcher_.match(keyframe_view_, view, prior, parallel_for);
   match.T_ref_curr = T_track_keyframe * match.T_ref_curr;
-  match.covariance = R_track_keyframe * match.covariance * R_track_keyframe.transpose();
+  match.covariance = Rotated(match.covariance, T_track_keyframe.theta);
   match.degenerate_direction = T_track_keyframe.rotation() * match.degenerate_direction;
   return match;
 }

@@ -31,7 +31,8 @@ class KeptScan {
   void Pack();
   [[nodiscard]] bool packed() const { return packed_ != nullptr; }
 
-  // REQUIRES of all: there is a scan. A packed one is unpacked each time.
+  // REQUIRES of all: there is a scan. A packed one is unpacked each time, but not for its stamp.
+  [[nodiscard]] Stamp stamp() const { return packed_ ? packed_->rest.stamp : whole_->stamp; }
   [[nodiscard]] std::shared_ptr<const Scan> Share() const;
   [[nodiscard]] Scan operator*() const { return packed_ ? Unpack(*packed_) : *whole_; }
   [[nodiscard]] std::shared_ptr<const Scan> operator->() const { return Share(); }

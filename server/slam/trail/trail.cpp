@@ -38,7 +38,7 @@ bool KeepsShape(const PoseRelation& relation) {
          (relation.covariance - PoseCovariance(kShapeSigmaM, kShapeSigmaRad)).cwiseAbs().maxCoeff() < kRounding;
 }
 
-void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
+void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::optional<std::vector<SurfacePoint>> points_robot,
                    const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit) {
   const std::size_t node = size();
   const Pose2 T_prev_curr = FromLast(T_track_robot);
@@ -46,7 +46,7 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
     relations_.push_back(
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
   shapes_.push_back({T_track_robot, TravelledTo(T_track_robot), made()});
-  points_.Keep(node, std::move(points_robot));
+  if (points_robot) points_.Keep(node, *std::move(points_robot));
   keyframe.scan.Pack();
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();

@@ -36,8 +36,9 @@ class Trail {
 
   // Appends the next keyframe. `step_covariance` is the covariance of the step to it, in the frame in which
   // the step starts, in addition to the drift; it is ignored for the first keyframe. `revisit` is an old
-  // keyframe that was seen again from this one. `points_robot` are the surface points of its scan.
-  void Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
+  // keyframe that was seen again from this one. `points_robot` are the surface points of its scan; nothing: they are
+  // found when somebody looks at them.
+  void Append(Keyframe keyframe, const Pose2& T_track_robot, std::optional<std::vector<SurfacePoint>> points_robot,
               const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit);
   // Sets whether the last keyframe is localized, so that it may be drawn, and if not, whether its place along the path
   // is known (Keyframe::tentative). REQUIRES: not empty.

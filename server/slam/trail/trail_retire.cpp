@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
@@ -43,11 +44,9 @@ class Components {
 PoseRelation HandedOver(const PoseRelation& relation, const Retirement& retirement) {
   const Pose2& T_representative_from = retirement.T_representative_keyframe[relation.from];
   const Pose2& T_representative_to = retirement.T_representative_keyframe[relation.to];
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_representative_from.rotation();
   PoseRelation result{retirement.representative[relation.from], retirement.representative[relation.to],
                       T_representative_from * relation.T_from_to * T_representative_to.Inverse(),
-                      R * relation.covariance * R.transpose(), true};
+                      Rotated(relation.covariance, T_representative_from.theta), true};
   // A shape stays one; how well it is kept is no matter of what was measured.
   if (KeepsShape(relation)) {
     result.covariance = relation.covariance;

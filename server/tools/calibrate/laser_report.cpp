@@ -1,6 +1,10 @@
 #include <cmath>
+#include <functional>
 #include <iomanip>
+#include <map>
 #include <sstream>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "common/options/config.h"
@@ -21,12 +25,13 @@ struct Line {
   const char* unit;
   double factor;  // From the value to the unit that is printed.
   int digits;
+  const char* option = nullptr;  // In slam.pairing; null: an option of those who read the log.
 };
 constexpr Line kLines[] = {
-    {kLag, "lag_s", "lag", "s", 1.0, 3},
-    {kWheelScale, "wheel_scale", "wheel scale", "", 1.0, 4},
-    {kTurnScale, "turn_scale", "turn scale", "", 1.0, 4},
-    {kTurnPerM, "turn_per_m", "turn per m", "rad", 1.0, 4},
+    {kLag, "lag_s", "lag", "s", 1.0, 3, "laser_lag_s"},
+    {kWheelScale, "wheel_scale", "wheel scale", "", 1.0, 4, "wheels.wheel_scale"},
+    {kTurnScale, "turn_scale", "turn scale", "", 1.0, 4, "wheels.turn_scale"},
+    {kTurnPerM, "turn_per_m", "turn per m", "rad", 1.0, 4, "wheels.turn_per_m"},
     {kX, "x_m", "laser x", "m", 1.0, 3},
     {kY, "y_m", "laser y", "m", 1.0, 3},
     {kHeading, "heading_rad", "laser heading", "deg", 180.0 / kPi, 2},
@@ -56,6 +61,47 @@ double ValueOf(const LaserReport& report, LaserUnknown what) {
 const char* PlaceName(const LidarTiming& timing) {
   constexpr const char* kPlaces[] = {"first", "middle", "last"};
   return kPlaces[static_cast<std::size_t>(timing.stamp_at.value_or(StampAt::kFirst))];
+}
+
+// Lets only those fields pass that the log has shown, each explained by how sure its value is, so that a file with them
+// leaves all others to the configuration that it is added to.
+class OnlyShown final : public OptionVisitor {
+ public:
+  using Doubts = std::map<std::string, std::string, std::less<>>;  // By key.
+  OnlyShown(OptionVisitor& to, const Doubts& doubts) : to_(to), doubts_(doubts) {}
+
+  void Section(std::string_view key, std::string_view help, const std::function<void()>& fields) override {
+    const std::string outer = std::exchange(prefix_, prefix_ + std::string(key) + '.');
+    to_.Section(key, help, fields);
+    prefix_ = outer;
+  }
+  void Real(std::string_view key, double& value, std::string_view unit, double min, double max,
+            const Help& /*help*/) override {
+    if (const auto doubt = doubts_.find(prefix_ + std::string(key)); doubt != doubts_.end())
+      to_.Real(key, value, unit, min, max, doubt->second.c_str());
+  }
+  void Integer(std::string_view /*key*/, std::int64_t& /*value*/, std::string_view /*unit*/, std::int64_t /*min*/,
+               std::int64_t /*max*/, const Help& /*help*/) override {}
+  void Flag(std::string_view /*key*/, bool& /*value*/, const Help& /*help*/) override {}
+  void Text(std::string_view /*key*/, std::string& /*value*/, const Help& /*help*/) override {}
+  void Choice(std::string_view /*key*/, int& /*value*/, std::span<const std::string_view> /*names*/,
+              const Help& /*help*/) override {}
+
+ private:
+  OptionVisitor& to_;
+  const Doubts& doubts_;
+  std::string prefix_;
+};
+
+OnlyShown::Doubts DoubtsOfShown(const LaserReport& report) {
+  OnlyShown::Doubts doubts;
+  for (const Line& line : kLines) {
+    if (line.option == nullptr || !report.fit.mounting.Shows(line.what)) continue;
+    std::ostringstream doubt;
+    doubt << std::setprecision(2) << "Measured, +- " << report.fit.mounting.Doubt(line.what) << '.';
+    doubts.emplace(line.option, doubt.str());
+  }
+  return doubts;
 }
 
 // The robot must do this for the value to show.
@@ -171,9 +217,14 @@ Result<std::string> ReportConfig(const LaserReport& report) {
   // In whole milliseconds: a lag of next to nothing would take scans away from the odometry that has their very stamps.
   if (report.fit.mounting.Shows(kLag)) pairing.laser_lag_s = std::round(1e3 * report.fit.lag_s) / 1e3;
   pairing.wheels = report.fit.mounting.wheels;
+  const OnlyShown::Doubts doubts = DoubtsOfShown(report);
   const VisitOptions visit = [&](OptionVisitor& visitor) {
-    visitor.Section("slam", "Learnt by cairn-calibrate laser.",
-                    [&] { visitor.Section("pairing", "", [&] { slam::Visit(visitor, pairing); }); });
+    visitor.Section("slam", "Learnt by cairn-calibrate laser.", [&] {
+      visitor.Section("pairing", "", [&] {
+        OnlyShown shown(visitor, doubts);
+        slam::Visit(shown, pairing);
+      });
+    });
   };
   std::string yaml = PrintYaml(visit);
   // Check that cairn-offline and cairnd would accept the file.

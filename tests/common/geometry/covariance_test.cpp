@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <limits>
 
 #include "common/geometry/pose2.h"
+#include "common/geometry/rotated_covariance.h"
 
 namespace cairn {
 namespace {
@@ -39,6 +41,20 @@ TEST(IsCovariance, RefusesNanAndInfinity) {
   EXPECT_FALSE(IsCovariance(matrix));
   matrix(1, 1) = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(IsCovariance(matrix));
+}
+
+// A robot that is unsure along its own x is unsure along y where it looks along y.
+TEST(Rotated, TurnsTheEllipseAndLeavesTheHeading) {
+  Eigen::Matrix3d covariance = Eigen::Vector3d(4.0, 1.0, 0.5).asDiagonal();
+  covariance(0, 2) = covariance(2, 0) = 0.3;
+  const double quarter_turn = std::acos(0.0);
+  const Eigen::Matrix3d turned = Rotated(covariance, quarter_turn);
+  Eigen::Matrix3d expected = Eigen::Vector3d(1.0, 4.0, 0.5).asDiagonal();
+  expected(1, 2) = expected(2, 1) = 0.3;
+  EXPECT_TRUE(turned.isApprox(expected, 1e-12)) << turned;
+  EXPECT_TRUE(Rotated(turned, -quarter_turn).isApprox(covariance, 1e-12));
+  const Eigen::Matrix3f in_floats = covariance.cast<float>();
+  EXPECT_TRUE(Rotated(in_floats, quarter_turn).isApprox(expected.cast<float>(), 1e-6F));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/maps/atlas.h"
+#include "server/maps/memory_shares.h"
 #include "server/store/site_contents.h"
 #include "server/store/sqlite_store.h"
 #include "tests/server/maps/uniform_chunk.h"

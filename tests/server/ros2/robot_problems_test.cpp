@@ -96,6 +96,25 @@ TEST_F(RosRobot, ComparesItsStampsWithTheClockOfTheServer) {
   EXPECT_THAT(Problems(), IsEmpty());
 }
 
+TEST_F(RosRobot, IsToldThatItsDriverDoesNotSayWhenBeamsAreMeasured) {
+  Open();
+  Pose();
+  EXPECT_THAT(Problems(), IsEmpty()) << "two rays";
+  const auto doubt = HasSubstr("scan: time_increment is 0");
+  const auto take = [this](std::size_t rays, double time_increment) {
+    ros2::LaserScan message = ScanMessage(5, rays);
+    message.time_increment = time_increment;
+    robot_.Take("scan", std::move(message), {kLidar, 5}, now_);
+  };
+  take(60, 0.0);  // 6 rad.
+  EXPECT_THAT(Problems(), ElementsAre(doubt));
+  EXPECT_TRUE(robot_.IsOnMap(now_));
+  take(60, 0.001);
+  EXPECT_THAT(Problems(), IsEmpty());
+  take(40, 0.0);
+  EXPECT_THAT(Problems(), IsEmpty()) << "4 rad: it may look at all of it at once";
+}
+
 TEST_F(RosRobot, NoticesThatAnotherNodePublishesMapToOdom) {
   const auto beside = HasSubstr("another node also publishes map to odom (its localisation, such as AMCL");
   Open();

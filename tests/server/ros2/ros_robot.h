@@ -28,13 +28,16 @@ class RosRobot : public ::testing::Test {
   }
   void Mount() { robot_.Take(Mounting(), {kStatic, 1}, now_); }
 
-  void Scan(std::int64_t number, const ros2::WriterId& writer = kLidar, const std::string& topic = "scan") {
+  static ros2::LaserScan ScanMessage(std::int64_t number, std::size_t rays = 2) {
     ros2::LaserScan message;
     message.header = {kStart + number * 100'000'000, "laser"};
     message.angle_increment = 0.1;
     message.range_max = 10.0;
-    message.ranges = {1.0F, 2.0F};
-    robot_.Take(topic, std::move(message), {writer, number}, now_);
+    message.ranges.assign(rays, 1.0F);
+    return message;
+  }
+  void Scan(std::int64_t number, const ros2::WriterId& writer = kLidar, const std::string& topic = "scan") {
+    robot_.Take(topic, ScanMessage(number), {writer, number}, now_);
   }
   void Odom(std::int64_t number, double x = 0.0) {
     ros2::Odometry message;

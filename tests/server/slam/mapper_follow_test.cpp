@@ -6,8 +6,10 @@
 #include <memory>
 #include <vector>
 
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/graph/pose_graph.h"
 #include "server/slam/mapper.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "server/slam/state/archive.h"
 #include "tests/server/slam/ring_drive.h"
 
@@ -110,9 +112,7 @@ TEST_P(MapperFollowsWith, ManySwitchesBetweenTwoPathsDoNotBlurTheEstimate) {
     if (moved) here.T_map_robot = T_new_old.Inverse() * here.T_map_robot;
     ASSERT_LT((here.T_map_robot.translation() - there.T_map_robot.translation()).norm(), 0.05) << i;
     ASSERT_LT(std::abs(AngleDiff(here.T_map_robot.theta, there.T_map_robot.theta)), 0.01) << i;
-    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    if (moved) R.topLeftCorner<2, 2>() = T_new_old.rotation();
-    const Eigen::Matrix3d expected = R * there.covariance * R.transpose();
+    const Eigen::Matrix3d expected = moved ? Rotated(there.covariance, T_new_old.theta) : there.covariance;
     ASSERT_LE((here.covariance - expected).norm(), 0.5 * expected.norm()) << i;
     std::vector<Pose2> path = mapper.BestPath();
     for (Pose2& pose : path) pose = (moved ? T_new_old.Inverse() : T_new_old) * pose;
@@ -226,6 +226,40 @@ TEST(MapperFollows, WhatAnAdoptedGridLacksIsDrawnSomeAtATimeAndBeforeACheckpoint
 }
 
 // A path that does not belong to the keyframes is not taken.
+// What was seen again since the last large loop has corrected the pose at once. At the end it corrects the way to
+// there, so that a job finds nothing more, and what is drawn lies along that path.
+TEST(MapperFollows, AtTheEndThePathFitsAllThatWasSeenAgain) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1);
+  for (std::size_t i = 0; i < drive.scans.size(); ++i)
+    static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  const auto most_apart = [](const std::vector<Pose2>& a, const std::vector<Pose2>& b) {
+    double most_m = 0.0;
+    for (std::size_t k = 0; k < a.size(); ++k)
+      most_m = std::max(most_m, (a[k].translation() - b[k].translation()).norm());
+    return most_m;
+  };
+  const MapperSnapshot before = mapper.Snapshot();
+  ASSERT_FALSE(before.relations.empty());
+  const std::vector<Pose2> smoothed = SmoothedPath(before);
+  ASSERT_GT(most_apart(before.full_path, smoothed), 0.005);
+  mapper.FinishMap();
+  const MapperSnapshot after = mapper.Snapshot();
+  EXPECT_LT(most_apart(after.full_path, smoothed), 0.001);
+  EXPECT_LT(most_apart(after.full_path, SmoothedPath(after)), 0.001);
+  EXPECT_EQ(after.full_path, after.online_path) << "the grid is drawn along it";
+  EXPECT_EQ(mapper.BestPath().back(), after.full_path.back());
+  options.pose_graph.enabled = false;
+  Mapper sampled(options, drive.truth.front(), 1);
+  for (std::size_t i = 0; i < drive.scans.size(); ++i)
+    static_cast<void>(sampled.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  const std::vector<Pose2> path = sampled.BestPath();
+  sampled.FinishMap();
+  EXPECT_EQ(sampled.BestPath(), path) << "nobody wants it fitted";
+}
+
 TEST(MapperFollows, APathOfAnotherLengthDoesNotMoveTheEstimator) {
   const Drive drive = DriveRound();
   MapperOptions options;

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/filters/revisit_innovation.h"
 #include "server/slam/motion/odometry_model.h"
 
@@ -103,16 +104,14 @@ TEST(ErrorEnsemble, AMovedMapKeepsTheDoubt) {
   for (int i = 0; i < 40; ++i) moved_drive.Step(moved, {0.5, 0.0, 0.0});
   const Pose2 T_new_old{30.0, -20.0, 1.5};
   moved.MoveMap(std::vector<Pose2>(drive.path.size(), T_new_old));
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_new_old.rotation();
-  const Eigen::Matrix3d here = R * errors.covariance(drive.T_map_robot) * R.transpose();
+  const Eigen::Matrix3d here = Rotated(errors.covariance(drive.T_map_robot), T_new_old.theta);
   EXPECT_LT((moved.covariance(T_new_old * drive.T_map_robot) - here).norm(), 1e-3 * here.norm());
   // What is seen again is as good evidence as before.
   SeeAgain(errors, drive, 20);
   moved_drive.T_map_robot = T_new_old * moved_drive.T_map_robot;
   for (Pose2& pose : moved_drive.path) pose = T_new_old * pose;
   SeeAgain(moved, moved_drive, 20);
-  const Eigen::Matrix3d again = R * errors.covariance(drive.T_map_robot) * R.transpose();
+  const Eigen::Matrix3d again = Rotated(errors.covariance(drive.T_map_robot), T_new_old.theta);
   EXPECT_LT((moved.covariance(moved_drive.T_map_robot) - again).norm(), 0.3 * again.norm());
 }
 

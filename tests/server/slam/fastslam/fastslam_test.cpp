@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/geometry/rotated_covariance.h"
 #include "server/slam/landmark_variants/landmark_oriented.h"
 #include "server/slam/landmark_variants/landmark_point.h"
 #include "server/slam/landmarks/landmark_pair.h"
@@ -226,17 +227,15 @@ TYPED_TEST(FastSlamVariants, AMovedPathTakesEveryParticleAlong) {
   EXPECT_GT(different.size(), 5U);
   ASSERT_EQ(moved.landmarks().size(), 2U);
   EXPECT_LT((moved.landmarks()[0].p_map - T_new_old * filter.landmarks()[0].p_map).norm(), 1e-9);
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_new_old.rotation();
   const auto was = filter.estimate(), is = moved.estimate();
   EXPECT_LT((is.T_map_robot.translation() - (T_new_old * was.T_map_robot).translation()).norm(), 1e-9);
-  EXPECT_LT((is.covariance - R * was.covariance * R.transpose()).norm(), 1e-9);
+  EXPECT_LT((is.covariance - Rotated(was.covariance, T_new_old.theta)).norm(), 1e-9);
   // It goes on as sure as before.
   filter.Predict({{1.0, 0, 0}});
   moved.Predict({{1.0, 0, 0}});
   filter.Commit();
   moved.Commit();
-  EXPECT_LT((moved.estimate().covariance - R * filter.estimate().covariance * R.transpose()).norm(),
+  EXPECT_LT((moved.estimate().covariance - Rotated(filter.estimate().covariance, T_new_old.theta)).norm(),
             0.3 * filter.estimate().covariance.norm());
 }
 

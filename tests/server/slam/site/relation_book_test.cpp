@@ -57,6 +57,20 @@ TEST(RelationBook, AKeyframeIsTheSameOnlyWithItsStamp) {
   EXPECT_EQ(book.Find(kPair, kRevisit, {1, 11}), nullptr);
 }
 
+TEST(RelationBook, KnowsThePathsOfTheLastJobWhileTheirSessionsExist) {
+  RelationBook book;
+  EXPECT_EQ(book.PathOf(3), nullptr);
+  for (const std::uint64_t session : {3, 8})
+    book.SetPath(session, {.frame = 3, .keyframes = {{0, 5}}, .path = {{1.0, 0.0, 0.0}}});
+  ASSERT_NE(book.PathOf(8), nullptr);
+  EXPECT_EQ(book.PathOf(8)->frame, 3U);
+  book.EndJob([](std::uint64_t session) { return session == 3; });
+  EXPECT_NE(book.PathOf(3), nullptr);
+  EXPECT_EQ(book.PathOf(8), nullptr);
+  book.ForgetPath(3);
+  EXPECT_EQ(book.PathOf(3), nullptr);
+}
+
 TEST(RelationBook, WhatWasNotBelievedIsLookedAtAgainWhenTheGuessHasMoved) {
   Measurement one = Found(1);
   EXPECT_TRUE(one.Holds({1.05, 0.0, 0.01}, 4.0));

@@ -150,6 +150,39 @@ TEST_F(TwoRobots, WhatAJobHasMeasuredTheNextOneKnows) {
   EXPECT_LE(book.measured(), 2U) << "nothing is new";
 }
 
+// Otherwise all would be drawn again.
+TEST_F(TwoRobots, WhereNothingIsNewNothingMoves) {
+  RelationBook book;
+  const std::vector<SiteSession> sessions{{First().snapshot, false, 4}, {Second().snapshot, false, 7}};
+  const auto run = [&] {
+    book.BeginJob();
+    auto smoothed = *SmoothSessions(
+        sessions, SiteOptionsOf(MapperOptions{}), [](double) { return true; }, SiteSearch::kAll, &book);
+    book.EndJob([](std::uint64_t) { return true; });
+    return smoothed;
+  };
+  const auto apart = [](const std::vector<Pose2>& a, const std::vector<Pose2>& b) {
+    double most_m = 0.0;
+    for (std::size_t k = 0; k < a.size(); ++k)
+      most_m = std::max(most_m, (a[k].translation() - b[k].translation()).norm());
+    return most_m;
+  };
+  const auto once = run(), twice = run();
+  ASSERT_TRUE(once[1].joined && twice[1].joined);
+  EXPECT_LT(apart(once[1].path, twice[1].path), 0.005);
+  ASSERT_NE(book.PathOf(7), nullptr);
+  EXPECT_EQ(book.PathOf(7)->path, twice[1].path);
+  EXPECT_EQ(book.PathOf(7)->frame, 4U);
+  // A path of another shape than that of the session now is of no use. Neither is one in the frame of another session.
+  SolvedPath bent = *book.PathOf(7), elsewhere = bent;
+  for (std::size_t k = 0; k < bent.path.size(); ++k) bent.path[k].y += 0.02 * static_cast<double>(k);
+  elsewhere.frame = 9;
+  for (const SolvedPath& wrong : {bent, elsewhere}) {
+    book.SetPath(7, wrong);
+    EXPECT_LT(apart(run()[1].path, twice[1].path), 0.005);
+  }
+}
+
 // A job that only looks for the places of robots leaves the rest to the next one.
 TEST_F(TwoRobots, AFragmentIsJoinedByWhatIsNeeded) {
   const std::vector<SiteSession> sessions{{First().snapshot, true}, {Second().snapshot, false}};

@@ -1,5 +1,6 @@
 #include "server/tools/calibrate/laser_run.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -81,6 +82,11 @@ TEST(LaserRun, RecoversWhatNobodyKnows) {
   }));
   EXPECT_NEAR(estimator.pairing.laser_lag_s, fit.lag_s, 0.0005);
   EXPECT_EQ(estimator.pairing.wheels, mounting.wheels);
+  // And nothing else, so that it leaves the rest of a configuration as it is.
+  for (const char* what : {"laser_lag_s", "wheel_scale", "turn_scale", "turn_per_m"})
+    EXPECT_THAT(*yaml, ::testing::ContainsRegex("# Measured, \\+- [0-9.e-]+\\.\n *" + std::string(what) + ": "));
+  for (const char* what : {"max_gap_s", "max_speed_m_s", "rolling", "expert"})
+    EXPECT_EQ(yaml->find(what), std::string::npos) << *yaml;
 }
 
 // A lidar that measures all beams at once is not said to turn.
