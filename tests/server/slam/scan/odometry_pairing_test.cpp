@@ -195,11 +195,72 @@ TEST(OdometryPairing, FinishUsesTheLastOdometryWhileItIsFresh) {
   EXPECT_EQ(p.pairing.waiting(), 0u);
 }
 
-TEST(OdometryPairing, FinishWithoutAnyOdometryDropsAll) {
+TEST(OdometryPairing, FinishWithoutAnyOdometryUsesTheScansAlone) {
   Pairing p;
   p.ScanAt(1);
   p.pairing.Finish();
-  EXPECT_THAT(p.drops, ElementsAre(Pair(1, DropReason::kNoOdometry)));
+  EXPECT_THAT(p.drops, IsEmpty());
+  EXPECT_THAT(p.with_odometry, ElementsAre(false));
+}
+
+TEST(OdometryPairing, ScansThatHaveWaitedForTheFirstOdometryAreUsedWithoutAny) {
+  PairingOptions options;
+  options.no_odometry_after_s = 2.0;
+  options.no_odometry_after_scans = 100;
+  Pairing p(options);
+  for (int i = 0; i < 20; ++i) p.ScanAt(kSecond + i * kSecond / 10);
+  EXPECT_THAT(p.pairs, IsEmpty());
+  EXPECT_FALSE(p.pairing.without_odometry());
+  p.ScanAt(3 * kSecond);
+  EXPECT_EQ(p.pairs.size(), 21u);
+  EXPECT_TRUE(p.pairing.without_odometry());
+  p.ScanAt(4 * kSecond);  // Waits no more.
+  EXPECT_EQ(p.pairs.size(), 22u);
+  EXPECT_EQ(p.pairing.waiting(), 0u);
+  EXPECT_EQ(std::count(p.with_odometry.begin(), p.with_odometry.end(), false), 22);
+  EXPECT_THAT(p.drops, IsEmpty());
+
+  options.no_odometry_after_scans = 5;
+  Pairing many(options);
+  for (int i = 1; i <= 4; ++i) many.ScanAt(i);
+  EXPECT_THAT(many.pairs, IsEmpty());
+  many.ScanAt(5);
+  EXPECT_EQ(many.pairs.size(), 5u);
+}
+
+TEST(OdometryPairing, OdometryThatBeginsLaterIsUsedFromThenOn) {
+  PairingOptions options;
+  options.no_odometry_after_scans = 2;
+  Pairing p(options);
+  p.ScanAt(1 * kSecond);
+  p.ScanAt(2 * kSecond);
+  p.OdometryAt(2 * kSecond + kSecond / 2, 7);
+  p.ScanAt(3 * kSecond);
+  EXPECT_EQ(p.pairs.size(), 2u);  // The third one waits for its odometry.
+  p.OdometryAt(3 * kSecond + kSecond / 2, 9);
+  p.ScanAt(3 * kSecond + kSecond / 4);
+  ASSERT_EQ(p.pairs.size(), 4u);
+  EXPECT_EQ(p.pairs[2].T_odom_robot.x, 8);
+  EXPECT_THAT(p.with_odometry, ElementsAre(false, false, true, true));
+  EXPECT_THAT(p.passages, ElementsAre(Passage::kDriven, Passage::kDriven, Passage::kOdometryBegan, Passage::kDriven));
+  EXPECT_FALSE(p.pairing.without_odometry());
+}
+
+// Who has not been watched meanwhile cannot be followed on.
+TEST(OdometryPairing, OdometryThatBeginsAfterAPauseOrWithAnotherClientSaysNothingOfTheStepToIt) {
+  PairingOptions options;
+  options.no_odometry_after_scans = 2;
+  for (const bool pause : {true, false}) {
+    Pairing p(options);
+    p.ScanAt(1 * kSecond);
+    p.ScanAt(2 * kSecond);
+    if (!pause) p.pairing.NewClient();
+    const Stamp next = (pause ? 8 : 3) * kSecond;
+    p.OdometryAt(next, 7);
+    p.ScanAt(next);
+    ASSERT_EQ(p.pairs.size(), 3u);
+    EXPECT_EQ(p.passages.back(), Passage::kUnknown) << pause;
+  }
 }
 
 TEST(OdometryPairing, StampsThatRepeatOrGoBackAreRefused) {
@@ -285,6 +346,7 @@ TEST(OdometryPairing, ScatteredJumpsProveNothing) {
 TEST(OdometryPairing, WaitingScansAreBounded) {
   PairingOptions options;
   options.max_waiting_scans = 3;
+  options.no_odometry_after_s = 100.0;
   Pairing p(options);
   for (int i = 1; i <= 5; ++i) p.ScanAt(i * kSecond);
   EXPECT_EQ(p.pairing.waiting(), 3u);
@@ -329,7 +391,8 @@ TEST(OdometryPairing, PairsDoNotDependOnHowTheStreamsInterleave) {
     if (random() % 5 == 0 && t > scans[0]) odometries.push_back(scans[scans.size() / 2]);
   }
   PairingOptions options;
-  options.max_waiting_scans = 10'000;
+  options.max_waiting_scans = options.no_odometry_after_scans = 10'000;
+  options.no_odometry_after_s = 1e6;
   options.max_odometry = 10'000;
   options.jump_confirmations = 1000;
   const auto run = [&](std::uint64_t seed) {
