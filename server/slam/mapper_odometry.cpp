@@ -58,8 +58,13 @@ Passage Mapper::State::ChooseOdometry(Passage passage, const Scan& scan, const P
     UseOdometry(false);
     return passage;
   }
+  // Odometry that stood may catch up at once. This jump says nothing: scans have shown the way.
   const bool stood = last_scan && OdometryStands(last_scan->T_odom_robot);
-  if (passage == Passage::kDriven && stood) passage = Passage::kOdometryBegan;
+  const bool watched =
+      passage == Passage::kDriven ||
+      (passage == Passage::kUnknown && last_scan &&
+       1e-9 * static_cast<double>(NanosBetween(last_scan->scan->stamp, scan.stamp)) <= options.pairing.max_pause_s);
+  if (stood && watched) passage = Passage::kOdometryBegan;
   // Nothing was followed that odometry could go on with.
   if (passage == Passage::kOdometryBegan && !last_scan) passage = Passage::kDriven;
   // What is known of a robot that is looked for, or followed in a map, contains its odometry.

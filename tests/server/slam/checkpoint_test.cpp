@@ -179,9 +179,9 @@ TEST_P(Checkpoints, StoppingChangesNothingOnARealLog) {
   ExpectNothingChangedByStopping(drive, GetParam().options(drive));
 }
 
-// Without odometry, with odometry that begins after the first third, and with one that stands from then on.
+// Without odometry, with odometry that begins later, and with one that stands, to the end or for a time.
 TEST(Checkpoint, StoppingChangesNothingOfARobotThatIsFollowedByItsScansAlone) {
-  for (const char* kind : {"none", "late", "stands"}) {
+  for (const char* kind : {"none", "late", "stands", "returns"}) {
     const Drive drive = test::WithOdometry(test::SimulatedDrive(kFast ? 60.0 : 20.0), kind);
     ExpectNothingChangedByStopping(drive, With(FilterKind::kFastSlam2Points));
   }

@@ -96,6 +96,7 @@ TEST_F(ScansAlone, OdometryThatStandsWhileTheScansMoveIsNotUsed) {
   const Followed returns = Follow(test::WithOdometry(drive, "returns"));
   EXPECT_GT(returns.Alone(), returns.outcomes.size() / 6);
   EXPECT_FALSE(returns.outcomes.back().scans_alone);
+  EXPECT_EQ(returns.NotLocalized(), 0u);
   EXPECT_LT(FarthestApart(returns, with_odometry), 0.5);
   EXPECT_FALSE(Says(returns, kLearnedOdometryStands));
 }

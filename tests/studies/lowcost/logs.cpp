@@ -47,8 +47,8 @@ void RunScansAlone(StudyContext& context) {
       "The same logs without their odometry, and with odometry that stands, beside those with it; no option is set. "
       "The scans by which paths are judged are moved by the true odometry. A corridor longer than the lidar sees comes "
       "out too short.");
-  Table table({"log", "odometry", "scans used", "not localized", "blur (mm)", "thickness (mm)", "smoothed (mm)",
-               "length (m)"});
+  Table table(
+      {"log", "odometry", "scans used", "not localized", "blur (mm)", "thickness (mm)", "smoothed (mm)", "length (m)"});
   for (const RealRobot& robot : RealRobots()) {
     const auto log = OpenRealLog(context, "lowcost/" + robot.log, context.Pick(0, 150), robot.timing);
     if (!log) continue;
