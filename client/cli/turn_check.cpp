@@ -9,7 +9,7 @@ namespace cairn::client {
 namespace {
 
 constexpr int kMostColumns = 360;
-constexpr double kWidest_rad = 0.9, kFewest = 30, kTurned_rad = 0.03, kStood_rad = 0.002;
+constexpr double kWidest_rad = 0.9, kFewest = 30, kTurned_rad = 0.03, kStood_rad = 0.002, kSeen_rad = 0.015;
 constexpr std::size_t kMostSamples = 4096, kMostWaiting = 1024;
 // Differences of two such stamps, and a little more, fit into an int64.
 constexpr Stamp kLatestStamp = std::int64_t{1} << 61;
@@ -107,9 +107,14 @@ void TurnCheck::Settle(const Pair& pair) {
   }
 }
 
-// Turns to both sides, as noise and people cause them, take each other away.
+// Turns to both sides, as noise and people cause them, take each other away; what a standing robot shows in an hour may
+// not add up.
 void TurnCheck::AddStanding(double odometry_turn_rad, double scan_turn_rad) {
-  standing_turn_rad_ = odometry_turn_rad < kStood_rad ? standing_turn_rad_ + scan_turn_rad : 0.0;
+  if (odometry_turn_rad >= kStood_rad) {
+    standing_turn_rad_ = 0.0;
+  } else if (std::abs(scan_turn_rad) >= kSeen_rad) {
+    standing_turn_rad_ += scan_turn_rad;
+  }
   standing_most_rad_ = std::max(standing_most_rad_, std::abs(standing_turn_rad_));
 }
 

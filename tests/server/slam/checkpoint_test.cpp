@@ -179,14 +179,6 @@ TEST_P(Checkpoints, StoppingChangesNothingOnARealLog) {
   ExpectNothingChangedByStopping(drive, GetParam().options(drive));
 }
 
-// Without odometry, with odometry that begins later, and with one that stands, to the end or for a time.
-TEST(Checkpoint, StoppingChangesNothingOfARobotThatIsFollowedByItsScansAlone) {
-  for (const char* kind : {"none", "late", "stands", "returns"}) {
-    const Drive drive = test::WithOdometry(test::SimulatedDrive(kFast ? 60.0 : 20.0), kind);
-    ExpectNothingChangedByStopping(drive, With(FilterKind::kFastSlam2Points));
-  }
-}
-
 // The bytes with one byte replaced. Half of the places are in the main part, which holds every index and size; the rest
 // is mostly scans and parts of the map.
 template <typename Try>

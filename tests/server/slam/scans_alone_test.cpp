@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/geometry/pose_difference.h"
@@ -16,6 +18,7 @@ struct Followed {
   std::vector<ScanOutcome> outcomes;
   std::vector<LearnedValue> learned;
   std::size_t dropped = 0;
+  std::string state;  // At the end.
 
   [[nodiscard]] std::size_t Alone() const {
     return static_cast<std::size_t>(std::ranges::count(outcomes, true, &ScanOutcome::scans_alone));
@@ -25,20 +28,29 @@ struct Followed {
   }
 };
 
-Followed Follow(const test::Drive& drive, const MapperOptions& options = {}) {
+// With `stop_every` > 0 the estimator is saved after so many scans each time, and another one goes on.
+Followed Follow(const test::Drive& drive, const MapperOptions& options = {}, std::size_t stop_every = 0) {
   Followed followed;
-  ScanPipeline pipeline(options, drive.T_map_robot_start, SerialFor,
-                        {.used = [&](const Scan&, const ScanOutcome& outcome) { followed.outcomes.push_back(outcome); },
-                         .dropped = [&](const Scan&, DropReason) { ++followed.dropped; }});
+  const ScanPipeline::Sink sink{
+      .used = [&](const Scan&, const ScanOutcome& outcome) { followed.outcomes.push_back(outcome); },
+      .dropped = [&](const Scan&, DropReason) { ++followed.dropped; }};
+  auto pipeline = std::make_unique<ScanPipeline>(options, drive.T_map_robot_start, SerialFor, sink);
+  std::size_t scans = 0;
   for (const LogRecord& record : drive.records) {
     if (const auto* const odometry = std::get_if<Odometry>(&record)) {
-      pipeline.Add(*odometry);
-    } else {
-      pipeline.Add(std::make_shared<const Scan>(std::get<Scan>(record)));
+      pipeline->Add(*odometry);
+      continue;
     }
+    pipeline->Add(std::make_shared<const Scan>(std::get<Scan>(record)));
+    if (stop_every == 0 || ++scans % stop_every != 0) continue;
+    std::string bytes;
+    pipeline->Save(bytes);
+    pipeline = std::make_unique<ScanPipeline>(options, Pose2{}, SerialFor, sink);
+    EXPECT_TRUE(pipeline->Load(bytes));
   }
-  pipeline.Finish();
-  followed.learned = pipeline.mapper().learned();
+  pipeline->Finish();
+  followed.learned = pipeline->mapper().learned();
+  pipeline->Save(followed.state);
   return followed;
 }
 
@@ -99,6 +111,20 @@ TEST_F(ScansAlone, OdometryThatStandsWhileTheScansMoveIsNotUsed) {
   EXPECT_EQ(returns.NotLocalized(), 0u);
   EXPECT_LT(FarthestApart(returns, with_odometry), 0.5);
   EXPECT_FALSE(Says(returns, kLearnedOdometryStands));
+}
+
+// Whether odometry is used follows from what a checkpoint has.
+TEST_F(ScansAlone, StoppingChangesNothing) {
+  MapperOptions options;
+  options.filter.particles = 30;
+  for (const char* const kind : {"none", "late", "stands", "returns"}) {
+    const test::Drive other = test::WithOdometry(drive, kind);
+    const Followed whole = Follow(other, options), stopped = Follow(other, options, 7);
+    ASSERT_EQ(whole.outcomes.size(), stopped.outcomes.size()) << kind;
+    for (std::size_t i = 0; i < whole.outcomes.size(); ++i)
+      ASSERT_EQ(whole.outcomes[i].T_map_robot, stopped.outcomes[i].T_map_robot) << kind << ", scan " << i;
+    EXPECT_TRUE(whole.state == stopped.state) << kind;
+  }
 }
 
 // The four options that map without odometry say the same as what is found out.
