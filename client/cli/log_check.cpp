@@ -171,7 +171,10 @@ void LogCheck::CollectFindings() {
   };
   const auto& r = report_;
   if (r.scans.count == 0) error("no scan", "is this a CARMEN or DP-SLAM log?");
-  if (r.odometry.count == 0 && r.scans.count > 0) error("no odometry", "scans without odometry are not used");
+  if (r.odometry.count == 0 && r.scans.count > 0)
+    note("no odometry",
+         "the robot is followed by its scans alone, which drifts more; the way along bare corridors comes out too "
+         "short");
   if (r.summary.complaint_count > 0)
     error(fmt::format("{} unreadable lines", r.summary.complaint_count),
           "they are skipped; see the list for line and reason");
@@ -207,9 +210,16 @@ void LogCheck::CollectFindings() {
 
 // What scans and odometry together show of the lidar.
 void LogCheck::CollectLidarFindings() {
-  constexpr double kSure = 0.7, kClearly = 0.02, kWorthwhile_s = 0.05, kSlow_hz = 20.0, kFullTurn_rad = 6.0;
+  constexpr double kStands_rad = 1.0, kSure = 0.7, kClearly = 0.02, kWorthwhile_s = 0.05, kSlow_hz = 20.0,
+                   kFullTurn_rad = 6.0;
   const auto& r = report_;
   const TurnFinding& turns = r.turns;
+  if (turns.turned_while_standing_rad > kStands_rad)
+    report_.findings.push_back(
+        {true,
+         fmt::format("the odometry does not move although the scans do (they turn by {:.0f} degrees while it stands)",
+                     Degrees(turns.turned_while_standing_rad)),
+         "the robot is then followed by its scans alone, which drifts more; mend the odometry"});
   const std::string measure = "`cairn-calibrate laser LOG` measures it and says what to do";
   if (turns.correlation < -kSure)
     report_.findings.push_back({false, "the scans turn against the odometry",
@@ -234,9 +244,8 @@ void LogCheck::CollectLidarFindings() {
 void AddCheckLog(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("check-log", "Say whether a robot log or bag is fit for mapping; needs no server");
   command->footer(
-      "Reads CARMEN and DP-SLAM logs, bags of ROS 2 and recordings. Exit code 1 where scans would be lost (each "
-      "finding says why "
-      "and what to do).\n"
+      "Reads CARMEN and DP-SLAM logs, bags of ROS 2 and recordings. Exit code 1 where scans would be lost, or the "
+      "odometry is broken (each finding says why and what to do).\n"
       "EXAMPLES\n  cairn check-log intel.clf\n  cairn check-log run.log --json");
   auto arguments = std::make_shared<CheckArguments>();
   command->add_option("log", arguments->log, "The log file, or the bag")->required()->type_name("FILE");

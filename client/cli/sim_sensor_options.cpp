@@ -100,7 +100,8 @@ void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet) {
   AddLaser(command, fleet);
   AddTilt(command, fleet.tilt);
   AddNumber(command, "--hz", fleet.scan_hz, 0.1, 200.0, "Scans per second");
-  AddNumber(command, "--odometry-hz", fleet.odometry_hz, 0.1, 500.0, "Odometry samples per second");
+  AddNumber(command, "--odometry-hz", fleet.odometry_hz, 0.0, 500.0,
+            "Odometry samples per second; 0: the robots send none");
   AddNumber(command, "--slip", fleet.wheels.slip_m_per_sqrt_m, 0.0, 0.2,
             "Standard deviation of the random wheel error after 1 m", "METRES");
   AddNumber(command, "--wheel-spread", fleet.wheel_spread.wheel_share, 0.0, 0.1,

@@ -74,9 +74,7 @@ std::string FormatRobot(const RobotStatus& robot) {
   }
   // What is not sure enough to be used is only in the JSON.
   for (const LearnedValue& learned : robot.learned) {
-    if (!learned.applied) continue;
-    text += fmt::format("  learned {} {:.4f} +- {:.4f}{}\n", learned.name, learned.value, learned.sigma,
-                        learned.unit == "1" ? "" : ' ' + learned.unit);
+    if (learned.applied) text += fmt::format("  {}\n", TextOf(learned));
   }
   for (const Ledger& ledger : robot.ledgers) {
     text += fmt::format(
@@ -222,7 +220,7 @@ std::string FormatLogReport(const LogReport& r) {
   for (const Finding& finding : r.findings) {
     text += fmt::format("{}: {}: {}\n", finding.error ? "error" : "warning", finding.what, finding.advice);
   }
-  return text + (r.has_errors() ? "not clean: scans will be lost\n" : "good for mapping\n");
+  return text + (r.has_errors() ? "not clean: scans will be lost or badly placed\n" : "good for mapping\n");
 }
 
 }  // namespace cairn::client

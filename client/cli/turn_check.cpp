@@ -9,7 +9,7 @@ namespace cairn::client {
 namespace {
 
 constexpr int kMostColumns = 360;
-constexpr double kWidest_rad = 0.9, kFewest = 30, kTurned_rad = 0.03;
+constexpr double kWidest_rad = 0.9, kFewest = 30, kTurned_rad = 0.03, kStood_rad = 0.002, kSeen_rad = 0.015;
 constexpr std::size_t kMostSamples = 4096, kMostWaiting = 1024;
 // Differences of two such stamps, and a little more, fit into an int64.
 constexpr Stamp kLatestStamp = std::int64_t{1} << 61;
@@ -89,15 +89,16 @@ std::optional<double> TurnCheck::HeadingAt(Stamp stamp) const {
 
 void TurnCheck::Settle(const Pair& pair) {
   std::array<double, kLags> turned{};
-  double most = std::abs(pair.turn_rad);
+  double odometry_most = 0.0;
   for (int k = 0; k < kLags; ++k) {
     const Stamp lag = StampFromSeconds(k * kStep_s - kWidest_s);
     const auto from = HeadingAt(pair.from - lag), to = HeadingAt(pair.to - lag);
     if (!from || !to) return;  // All lags are compared over the same pairs.
     turned[static_cast<std::size_t>(k)] = AngleDiff(*to, *from);
-    most = std::max(most, std::abs(turned[static_cast<std::size_t>(k)]));
+    odometry_most = std::max(odometry_most, std::abs(turned[static_cast<std::size_t>(k)]));
   }
-  if (most < kTurned_rad) return;
+  AddStanding(odometry_most, pair.turn_rad);
+  if (std::max(odometry_most, std::abs(pair.turn_rad)) < kTurned_rad) return;
   for (std::size_t k = 0; k < sums_.size(); ++k) {
     sums_[k].xy += turned[k] * pair.turn_rad;
     sums_[k].xx += turned[k] * turned[k];
@@ -106,8 +107,20 @@ void TurnCheck::Settle(const Pair& pair) {
   }
 }
 
+// Turns to both sides, as noise and people cause them, take each other away; what a standing robot shows in an hour may
+// not add up.
+void TurnCheck::AddStanding(double odometry_turn_rad, double scan_turn_rad) {
+  if (odometry_turn_rad >= kStood_rad) {
+    standing_turn_rad_ = 0.0;
+  } else if (std::abs(scan_turn_rad) >= kSeen_rad) {
+    standing_turn_rad_ += scan_turn_rad;
+  }
+  standing_most_rad_ = std::max(standing_most_rad_, std::abs(standing_turn_rad_));
+}
+
 TurnFinding TurnCheck::Finish() {
   TurnFinding finding;
+  finding.turned_while_standing_rad = standing_most_rad_;
   finding.pairs = sums_.front().count;
   if (static_cast<double>(finding.pairs) < kFewest) return finding;
   std::size_t best = 0;

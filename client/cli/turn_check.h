@@ -20,6 +20,8 @@ struct TurnFinding {
   double correlation = 0.0;  // Between both turns at the best lag, with the sign of the turn; 0 if there are too few.
   double correlation_at_once = 0.0;
   double lag_s = 0.0;  // Stamps of scans are later by this than the odometry's.
+  // The farthest that scans have turned, to one side, while odometry stood still.
+  double turned_while_standing_rad = 0.0;
 };
 
 class TurnCheck {
@@ -45,6 +47,7 @@ class TurnCheck {
   };
 
   void Settle(const Pair& pair);
+  void AddStanding(double odometry_turn_rad, double scan_turn_rad);
   [[nodiscard]] std::optional<double> HeadingAt(Stamp stamp) const;
 
   struct Profile {
@@ -56,6 +59,8 @@ class TurnCheck {
   std::deque<Pair> waiting_;       // Odometry does not reach far enough yet.
   std::deque<Odometry> odometry_;  // The last seconds.
   std::array<Sums, kLags> sums_{};
+  double standing_turn_rad_ = 0.0;  // Of the scans, since odometry stands still,
+  double standing_most_rad_ = 0.0;  // and the most of all such times.
 };
 
 }  // namespace cairn::client

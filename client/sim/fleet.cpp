@@ -21,11 +21,14 @@ int HaltScans(const FleetOptions& o) {
   return static_cast<int>(std::min(std::ceil(seconds * o.scan_hz), 1e6)) + 2;
 }
 
+// Robots that send no odometry steer as often as others do.
+constexpr double kSilentHz = 50.0;
+
 }  // namespace
 
 Result<void> Validate(const FleetOptions& o) {
   if (o.robots < 1 || o.robots > 1000) return Fail(StatusCode::kInvalidArgument, "fleet: robots must be 1..1000");
-  for (const double hz : {o.scan_hz, o.odometry_hz}) {
+  for (const double hz : {o.scan_hz, o.odometry_hz == 0.0 ? kSilentHz : o.odometry_hz}) {
     if (!(hz >= 0.1 && hz <= 1000.0)) return Fail(StatusCode::kInvalidArgument, "fleet: rates must be 0.1..1000 Hz");
   }
   if (!(o.robot_radius_m > 0.0 && o.robot_radius_m <= 5.0)) {
@@ -51,7 +54,8 @@ Result<Fleet> Fleet::Create(Surroundings surroundings, const FleetOptions& optio
 }
 
 Fleet::Fleet(Surroundings surroundings, const FleetOptions& options)
-    : surroundings_(std::move(surroundings)), options_(options) {
+    : surroundings_(std::move(surroundings)), options_(options), silent_(options.odometry_hz == 0.0) {
+  if (silent_) options_.odometry_hz = kSilentHz;
   const auto count = static_cast<std::size_t>(options_.robots), routes = surroundings_.routes.size();
   for (std::size_t i = 0; i < count; ++i) {
     const auto& waypoints = surroundings_.routes[i % routes].waypoints_map;
@@ -147,6 +151,13 @@ Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
 }
 
 FleetRecord Fleet::Next() {
+  for (;;) {
+    FleetRecord next = Advance();
+    if (!silent_ || std::holds_alternative<Scan>(next.record)) return next;
+  }
+}
+
+FleetRecord Fleet::Advance() {
   const auto due = [this](const Member& member) { return std::min(NextScan(member), NextOdometry(member)); };
   const auto next = std::min_element(robots_.begin(), robots_.end(),
                                      [&](const Member& a, const Member& b) { return due(a) < due(b); });

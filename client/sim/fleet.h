@@ -27,7 +27,7 @@ namespace cairn::sim {
 struct FleetOptions {
   int robots = 3;  // 1..1000; spread over the world's routes, and along them where there are more.
   double scan_hz = 10.0;
-  double odometry_hz = 50.0;
+  double odometry_hz = 50.0;  // 0: robots that send none.
   LaserOptions laser;
   TiltOptions tilt;
   WheelOptions wheels;  // Means over all robots; each robot differs from them by wheel_spread.
@@ -89,10 +89,13 @@ class Fleet {
   [[nodiscard]] std::vector<DriveLeg> DriveDuringScan(const Member& member) const;
   // Those that a robot can see closed.
   void AddDoors(const Member& member, double seconds, std::vector<Post>& posts) const;
+  // The next record, also one of a robot that sends no odometry.
+  [[nodiscard]] FleetRecord Advance();
   [[nodiscard]] Scan TakeScan(std::size_t index, Stamp since_start);
 
   Surroundings surroundings_;
   FleetOptions options_;
+  bool silent_;
   std::vector<Member> robots_;
 };
 

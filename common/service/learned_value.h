@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 namespace cairn {
 
@@ -16,5 +17,11 @@ struct LearnedValue {
   [[nodiscard]] bool operator==(const LearnedValue&) const = default;
 };
 inline constexpr std::size_t kMostLearned = 16;
+
+// Two that are no parameters, with the value 1: the robot is followed by its scans alone, because it sends no odometry,
+// or because its odometry stands still although its scans move.
+inline constexpr std::string_view kLearnedNoOdometry = "no_odometry", kLearnedOdometryStands = "odometry_stands";
+// What it says, for a reader.
+[[nodiscard]] std::string TextOf(const LearnedValue& learned);
 
 }  // namespace cairn

@@ -36,7 +36,8 @@ std::string RobotStream::WhyNoOdometry(Clock::time_point now) const {
            "representation than XCDR1?";
   }
   return "there is no odometry: neither the topic " + options_.odom_topic + " nor a transform from '" +
-         options_.odom_frame + "' to '" + options_.base_names().front() + "' on tf";
+         options_.odom_frame + "' to '" + options_.base_names().front() + "' on tf" +
+         (HasNoOdometry(now) ? " (it is followed by its scans alone until there is)" : "");
 }
 
 std::vector<std::string> RobotStream::ProblemsOfScans(Clock::time_point now) const {

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::chrono::seconds kStartLasts{10};      // The robot may be elsewhere when it is opened later.
 constexpr std::chrono::seconds kFresh{2};            // Odometry that is older does not open a session.
+constexpr std::chrono::seconds kNoOdometryAfter{5};  // A robot that has scans for so long, and no odometry, has none.
 constexpr std::chrono::seconds kTryAgain{1};         // After a refusal that will pass by itself.
 constexpr std::chrono::seconds kTryLater{5};         // After any other.
 constexpr std::size_t kMaxEarly = 64;                // Odometry samples kept for the first scan of a session.
@@ -63,7 +64,7 @@ void RobotStream::FindMounting(Lidar& lidar) {
     return;  // Odometry does not change the version.
   } else if (const auto motion =
                  ros2::FindMotion(std::array<const ros2::FrameTree*, 2>{&frames_, &shared_frames_}, base_frame_,
-                                  lidar.frame, std::array{odom_frame_, options_.map_frame})) {
+                                  lidar.frame, std::array{odom_frame_or_usual(), options_.map_frame})) {
     const auto mounting = ros2::MountingOf(*motion);
     lidar.why_not = mounting ? std::string() : mounting.error().message;
     if (mounting) lidar.mounting = *mounting;
@@ -86,6 +87,8 @@ void RobotStream::Take(const std::string& topic, ros2::LaserScan&& message, cons
     lidar.frame = message.header.frame;
     lidar.frames_version = 0;
   }
+  if (!scans_since_) scans_since_ = now;
+  if (HasNoOdometry(now)) GuessBaseFrame();
   FindMounting(lidar);
   if (phase_ != Phase::kOpen) {
     OpenIfComplete(now);
@@ -244,11 +247,34 @@ bool RobotStream::odometry_is_fresh(Clock::time_point now) const {
   return odometry_stamp_ && now - odometry_received_ < kFresh;
 }
 
+bool RobotStream::HasNoOdometry(Clock::time_point now) const {
+  return !odometry_stamp_ && !odometry_published_ && odometry_fault_.empty() && scans_since_ &&
+         now - *scans_since_ >= kNoOdometryAfter;
+}
+
+// Of a robot without odometry. Transforms may come later than scans, so it is done until one fits.
+void RobotStream::GuessBaseFrame() {
+  const auto connects = [this](const std::string& base) {
+    return std::any_of(lidars_.begin(), lidars_.end(), [&](const auto& one) {
+      const std::array<const ros2::FrameTree*, 2> trees{&frames_, &shared_frames_};
+      return !one.second.frame.empty() &&
+             ros2::FindMotion(trees, base, one.second.frame, std::array{options_.odom_frame, options_.map_frame});
+    });
+  };
+  if (!base_frame_.empty() && connects(base_frame_)) return;
+  const std::vector<std::string> names = options_.base_names();
+  const auto known = std::find_if(names.begin(), names.end(), connects);
+  const std::string& base = known == names.end() ? names.front() : *known;
+  if (base == base_frame_) return;
+  base_frame_ = base;
+  for (auto& [topic, lidar] : lidars_) lidar.frames_version = 0;
+}
+
 void RobotStream::OpenIfComplete(Clock::time_point now) {
   if (phase_ == Phase::kEnded || (phase_ == Phase::kRefused && now < try_again_)) return;
   const bool mounted =
       std::any_of(lidars_.begin(), lidars_.end(), [](const auto& one) { return one.second.mounting.has_value(); });
-  if (!mounted || !odometry_is_fresh(now)) return;
+  if (!mounted || !(odometry_is_fresh(now) || HasNoOdometry(now))) return;
   if (start_ && now - start_received_ > kStartLasts) {
     spdlog::warn("ROS 2: an initial pose of {} is not used, because its session could not be opened within {} s",
                  place_.robot, kStartLasts.count());
@@ -322,6 +348,7 @@ void RobotStream::SetPublishers(bool scans, bool odometry, Clock::time_point /*n
   const bool returns = scans && !scans_published_;
   scans_published_ = scans;
   odometry_published_ = odometry;
+  if (odometry || !scans) scans_since_.reset();  // It waits anew.
   // A session that somebody has ended is opened again only for a robot that was started again.
   if (returns && phase_ == Phase::kEnded) phase_ = Phase::kWaiting;
   if (phase_ != Phase::kOpen || alive_ == scans) return;

@@ -1,9 +1,10 @@
 // One ROS 2 robot at the door: turns what its namespace publishes into the values that the native door passes on, and
 // opens and keeps its session for it. It pushes a session request first and samples behind it; the channel keeps the
 // order. It needs three things before it opens a session: a scan, odometry, and how the lidar of the scan is mounted.
-// What is missing, or refused, it says in words (Problems). Where somebody says where the robot is while it has a
-// session, the server is asked to look for it there (TakeHint). Not thread-safe: the door holds its lock. Time is given
-// by the caller.
+// A robot whose scans arrive for five seconds without anything that publishes odometry has none: it is followed by its
+// scans alone, and its frame is the first of ros2.base_frames that transforms connect with a lidar. What is missing, or
+// refused, it says in words (Problems). Where somebody says where the robot is while it has a session, the server is
+// asked to look for it there (TakeHint). Not thread-safe: the door holds its lock. Time is given by the caller.
 #pragma once
 
 #include <chrono>
@@ -77,7 +78,9 @@ class RobotStream {
 
   [[nodiscard]] const RobotPlace& place() const { return place_; }
   [[nodiscard]] bool open() const { return phase_ == Phase::kOpen; }
-  [[nodiscard]] const std::string& odom_frame() const { return odom_frame_; }
+  // The frame that the transform from the map leads to; that of the robot itself where it has no odometry. Empty as
+  // long as it is not known.
+  [[nodiscard]] const std::string& odom_frame() const { return odom_frame_.empty() ? base_frame_ : odom_frame_; }
   // Its scans are used, and the last pose is localized.
   [[nodiscard]] bool IsOnMap(Clock::time_point now) const;
   // Why it is not on the map, or what else is wrong. `server_clock`: the time of the server, as stamps say it;
@@ -116,6 +119,8 @@ class RobotStream {
   bool Push(InboundValue&& value);
   void Send(const Odometry& odometry, const ros2::Origin& origin);
   [[nodiscard]] bool odometry_is_fresh(Clock::time_point now) const;
+  [[nodiscard]] bool HasNoOdometry(Clock::time_point now) const;
+  void GuessBaseFrame();
   [[nodiscard]] std::string WhyNoOdometry(Clock::time_point now) const;
   [[nodiscard]] std::vector<std::string> BeamTimesInDoubt(Clock::time_point now) const;
   [[nodiscard]] std::vector<std::string> ProblemsOfScans(Clock::time_point now) const;
@@ -143,12 +148,13 @@ class RobotStream {
   std::map<std::string, Lidar> lidars_;  // By topic.
 
   std::string odom_frame_;
-  std::string base_frame_;  // Empty until odometry says it.
+  std::string base_frame_;  // Empty until odometry says it, or it is known that there is none.
   ros2::SampleNumbers odometry_numbers_;
   std::deque<EarlyOdometry> early_;  // The last ones: the first scan of a session needs odometry before it.
   std::optional<Stamp> odometry_stamp_;
   Clock::time_point odometry_received_{};
   std::string odometry_fault_;
+  std::optional<Clock::time_point> scans_since_;  // Since then scans arrive, and nothing publishes odometry.
 
   Phase phase_ = Phase::kWaiting;
   ClientId client_ = 0;

@@ -23,7 +23,8 @@ Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
-                                   const ParallelFor& parallel_for, Passage passage, const RollingScan* rolling) {
+                                   const ParallelFor& parallel_for, Passage passage, const RollingScan* rolling,
+                                   bool odometry_begins) {
   State& s = *this;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
@@ -53,16 +54,19 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
   if (doubted) last = ScanBefore{s.last_scan->scan->stamp, s.last_scan->T_track_robot};
   TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
                                   std::move(scan), rolling, T_odom_robot, parallel_for, last);
+  if (odometry_begins) s.front_end.ForgetEarlierOdometry();
   s.Begin(ScanStep::kRecover);
   s.CheckPlace(passage, rolling != nullptr, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
-  s.learning.LearnUnless(passage != Passage::kDriven || s.recovery.active(), step);
+  s.learning.LearnUnless(passage != Passage::kDriven || s.recovery.active() || !s.options.front_end.use_odometry, step);
   if (s.recovery.doubt()) s.EndDoubt(*still, view.points_robot, step, parallel_for);
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
   s.Begin(ScanStep::kOther);
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
-  const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
+  // The step to the next keyframe begins where odometry does.
+  const bool keyframe =
+      s.trail.empty() || odometry_begins || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
   if (keyframe) {
     s.front_end.AddKeyframe(view);
     s.AddKeyframe({std::move(still), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
@@ -331,7 +335,7 @@ void Mapper::Save(StateWriter& archive) const {
 }
 
 void Mapper::Load(StateReader& archive) {
-  auto loaded = std::make_unique<State>(state_->options, Pose2{}, 0);
+  auto loaded = std::make_unique<State>(state_->configured, Pose2{}, 0);
   archive(*loaded);
   if (archive.ok()) loaded->filter->Load(archive);
   if (!archive.RequireThat([&] { return loaded->IsConsistent(); }, "the paths")) return;

@@ -38,7 +38,8 @@ struct ScanOutcome {
   bool localized = false;
   double score = 0.0;
   PoseReason reason = PoseReason::kWaiting;
-  bool keyframe = false;  // True if the scan updated filter and map.
+  bool keyframe = false;     // True if the scan updated filter and map.
+  bool scans_alone = false;  // Odometry would be used, but there was none that says anything. Not stored.
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
@@ -46,6 +47,13 @@ struct ScanOutcome {
             self.keyframe);
     archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
   }
+};
+
+// Whether odometry tells how a robot moves.
+enum class OdometryUse : std::uint8_t {
+  kUsed,
+  kNone,    // It sends none, or the options say that it is not used.
+  kStands,  // It stands still although the last keyframes show that the robot moves: wheels that are not measured.
 };
 
 class Mapper {
@@ -66,8 +74,14 @@ class Mapper {
                       Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr,
                       const Pose2& odometry_rate = {});
 
+  // Whether the next scans come with odometry (PairedScan::has_odometry). It is not part of the state.
+  void ExpectOdometry(bool has_odometry);
+  // Where odometry is not used, scans alone show the motion (ForScansAlone) until it is there, or moves, again.
+  [[nodiscard]] OdometryUse odometry_use() const;
+
   // What was learned of the robot's odometry (tracking/odometry_learning.h), and the lag with which scans are to be
-  // paired from now on (OdometryPairing::SetLag).
+  // paired from now on (OdometryPairing::SetLag). Where scans alone show the motion, one of the names of
+  // learned_value.h says so.
   [[nodiscard]] std::vector<LearnedValue> learned() const;
   [[nodiscard]] double learned_lag_s() const;
 

@@ -94,7 +94,7 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
       rolling && last_scan && std::abs(AngleDiff(T_odom_robot.theta, last_scan->T_odom_robot.theta)) > kFastTurnRad;
   const auto before_carried = driven && !deformed ? BeforeCarriedInMap(*still, view.points_robot, step) : std::nullopt;
   if (before_carried && !StoodStill(*still, T_odom_robot, step)) localisation->Doubt(*before_carried, step.score);
-  learning.LearnUnless(!driven || localisation->looking(), step);
+  learning.LearnUnless(!driven || localisation->looking() || !options.front_end.use_odometry, step);
   // The last scans do not belong together with this one.
   if (!watched || (!step.matched && localisation->looking())) {
     localisation->Lose(options.front_end.use_odometry && passage != Passage::kUnknown);

@@ -1,5 +1,6 @@
 #include "server/slam/mapper_options.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "common/options/config.h"
@@ -51,6 +52,19 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
                   [&] { Visit(visitor, options.pairing); });
   visitor.Section("learning", "What is learned of the wheels and of the lag of the lidar while the robot drives.",
                   [&] { Visit(visitor, options.learning); });
+}
+
+MapperOptions ForScansAlone(MapperOptions options) {
+  constexpr double kSearchedM = 6.0;
+  constexpr std::int64_t kNeighbours = 20;
+  options.front_end.use_odometry = false;
+  // The default compares lines from where odometry says that the robot is.
+  if (options.matcher == MapperOptions{}.matcher) options.matcher = MatcherKind::kNdt;
+  options.revisit.max_distance_m = std::max(options.revisit.max_distance_m, kSearchedM);
+  options.revisit.neighbours = std::max(options.revisit.neighbours, kNeighbours);
+  NoOdometryOptions& forecast = options.front_end.no_odometry;
+  forecast.merged_keyframes = std::min(forecast.merged_keyframes, options.front_end.reference_keyframes);
+  return options;
 }
 
 Result<void> Validate(const MapperOptions& options) {

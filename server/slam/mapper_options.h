@@ -45,6 +45,9 @@ struct MapperOptions {
   LearningOptions learning;
 };
 void Visit(OptionVisitor& visitor, MapperOptions& options);
+// The same for a robot whose odometry is not used (tracking/README.md, Without odometry): it drifts more, so old places
+// are looked for farther off. A matcher that was chosen instead of the default stays.
+[[nodiscard]] MapperOptions ForScansAlone(MapperOptions options);
 // Checks the rules between fields that Visit declares. The error names both keys as in a configuration file,
 // beginning with `slam.`.
 [[nodiscard]] Result<void> Validate(const MapperOptions& options);

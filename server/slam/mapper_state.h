@@ -32,7 +32,8 @@ inline constexpr double kFastTurnRad = 0.1;
 
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
-      : options(given),
+      : configured(given),
+        options(given),
         front_end(given.front_end, MakeMatcher(given.matcher, given.matching), given.odometry_walk),
         blind(given.odometry_walk, given.front_end.use_odometry, given.lost_after_m),
         trail(given.filter.back_end.drift, given.front_end.surface),
@@ -45,10 +46,15 @@ struct Mapper::State {
         drawing(given.grid),
         learning(given.learning, given.front_end.use_odometry) {}
 
+  // From the next scan on.
+  void UseOdometry(bool use);
+  [[nodiscard]] bool OdometryStands(const Pose2& T_odom_robot) const;
+  [[nodiscard]] OdometryUse UseOfOdometry() const;
+  Passage ChooseOdometry(Passage passage, const Scan& scan, const Pose2& T_odom_robot);
   void Begin(ScanStep step) const { slam::Begin(front_end.watch(), step); }
   // Mapper::Process, with odometry as it is used.
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
-                      Passage passage, const RollingScan* rolling);
+                      Passage passage, const RollingScan* rolling, bool odometry_begins);
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   Passage BeginAfter(Passage passage, bool tilted);
   [[nodiscard]] double LastTurn() const;
@@ -206,7 +212,9 @@ struct Mapper::State {
   // Whether the parts fit together after reading.
   [[nodiscard]] bool IsConsistent() const;
 
-  const MapperOptions options;
+  const MapperOptions configured;
+  MapperOptions options;     // As they are in use: `configured`, or those for scans alone.
+  bool has_odometry = true;  // Mapper::ExpectOdometry.
   FrontEnd front_end;
   BlindMotion blind;
   ConstantSpeed speed;  // Speed of the motion from keyframe to keyframe.

@@ -20,6 +20,7 @@ ScanPipeline::ScanPipeline(const MapperOptions& options, const Pose2& T_map_robo
                         restamped->stamp = pair.stamp;
                         scan = std::move(restamped);
                       }
+                      mapper_.ExpectOdometry(pair.has_odometry);
                       const RollingScan rolling{pair.scan, std::move(pair.during)};
                       const ScanOutcome outcome =
                           mapper_.Process(std::move(scan), pair.T_odom_robot, parallel_for_, pair.passage,
@@ -68,6 +69,7 @@ Result<std::vector<std::shared_ptr<const void>>> ScanPipeline::LoadPieces(std::s
                 std::string("the checkpoint is damaged: ") + (archive.ok() ? "more than the state" : archive.failed()));
   again(pairing_);
   mapper_ = std::move(mapper);
+  mapper_.ExpectOdometry(!pairing_.without_odometry());
   return again.values();
 }
 

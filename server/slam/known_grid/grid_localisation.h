@@ -42,6 +42,10 @@ class GridLocalisation {
  public:
   explicit GridLocalisation(const GridLocalisationOptions& options);
 
+  void UseOdometry(bool use) {
+    options_.uses_odometry = use;
+    recovery_.UseOdometry(use);
+  }
   // From now on the robot is looked for in this map and then followed: near `known` if somebody says that it is there,
   // otherwise everywhere.
   void Begin(std::shared_ptr<const KnownGrid> map, const Recovery::Known& known, bool said);

@@ -83,6 +83,7 @@ class Recovery {
         uses_odometry_(uses_odometry),
         lost_after_m_(lost_after_m) {}
 
+  void UseOdometry(bool use) { uses_odometry_ = use; }
   [[nodiscard]] bool active() const { return active_; }
   // `odometry_goes_on`: the odometry since `known` is that of one drive.
   void Begin(const Known& known, bool odometry_goes_on);

@@ -54,6 +54,13 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
       "max_waiting_scans", options.max_waiting_scans, "scans", 1, 10000,
       "Scans that may wait for odometry. When there are more, the oldest is dropped. A scan whose beams were "
       "measured one after the other waits until there is odometry at its last beam.");
+  visitor.Real("no_odometry_after_s", options.no_odometry_after_s, "s", 0.1, 1e7,
+               "When the first scans have waited for the first odometry for so long, by their stamps, the robot counts "
+               "as one without odometry, and is mapped from its scans alone until it sends some.");
+  visitor.Integer(
+      "no_odometry_after_scans", options.no_odometry_after_scans, "scans", 2, 10000,
+      "The same after so many waiting scans, whatever their time. A client that bounds how far it runs ahead "
+      "must allow at least so many.");
   visitor.Integer(
       "max_odometry", options.max_odometry, "samples", 2, 100000,
       "Odometry samples that are kept for later scans. When there are more, the oldest is dropped. They must "
@@ -132,6 +139,7 @@ void OdometryPairing::NewClient() {
 void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
   scans_.push_back(std::move(scan));
   Flush();
+  if (without_odometry() || WaitsInVain()) PairWithoutOdometry();
   if (scans_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
     const auto oldest = std::move(scans_.front());
     scans_.pop_front();
@@ -139,7 +147,27 @@ void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
   }
 }
 
+// Whether the first scans have waited long enough for the first odometry.
+bool OdometryPairing::WaitsInVain() const {
+  if (newest_ || scans_.empty()) return false;
+  return scans_.size() >= static_cast<std::size_t>(options_.no_odometry_after_scans) ||
+         NanosBetween(scans_.front()->stamp, scans_.back()->stamp) >= Nanos(options_.no_odometry_after_s);
+}
+
+// REQUIRES: there has been no odometry.
+void OdometryPairing::PairWithoutOdometry() {
+  for (const auto& scan : std::exchange(scans_, {})) {
+    std::vector<Odometry> stands;
+    if (const std::uint64_t duration_ns = DurationNs(*scan); duration_ns > 0) {
+      const auto end = static_cast<Stamp>(static_cast<std::uint64_t>(scan->stamp) + duration_ns);
+      stands = {{.stamp = scan->stamp}, {.stamp = end}};
+    }
+    Hand(scan, std::move(stands), {}, {}, false);
+  }
+}
+
 void OdometryPairing::Take(const Odometry& sample) {
+  if (without_odometry()) Note(Passage::kOdometryBegan);
   Odometry odometry = Corrects() ? Corrected(sample) : sample;
   if (newest_ && !Follows(odometry, sample.T_odom_robot)) {
     BeginAnew(Passage::kUnknown);
@@ -159,13 +187,13 @@ void OdometryPairing::Take(const Odometry& sample) {
 void OdometryPairing::ScanClockSetBack(Stamp last) {
   if (!odometry_gate_.IsBefore(last, Nanos(options_.max_gap_s))) return BeginAnew(Passage::kUnwatched);
   DropWaitingScans();
-  passage_ = std::max(passage_, Passage::kUnwatched);
+  Note(Passage::kUnwatched);
 }
 
 void OdometryPairing::OdometryClockSetBack(Stamp last) {
   if (!scan_gate_.IsBefore(last, Nanos(options_.max_gap_s))) return BeginAnew(Passage::kUnwatched);
   odometry_.clear();
-  passage_ = std::max(passage_, Passage::kUnwatched);
+  Note(Passage::kUnwatched);
   time_known_ = false;
 }
 
@@ -177,8 +205,15 @@ void OdometryPairing::DropWaitingScans() {
 void OdometryPairing::BeginAnew(Passage passage) {
   DropWaitingScans();
   odometry_.clear();
-  passage_ = std::max(passage_, passage);
+  Note(passage);
   time_known_ = false;
+}
+
+// Adds it to what lies between the last pair and the next one.
+void OdometryPairing::Note(Passage passage) {
+  const bool began = passage_ == Passage::kOdometryBegan || passage == Passage::kOdometryBegan;
+  const bool alone = passage_ == Passage::kDriven || passage == Passage::kDriven || passage_ == passage;
+  passage_ = began && !alone ? Passage::kUnknown : std::max(passage_, passage);
 }
 
 // Whether this may be the odometry of the same drive as the sample before. `logged`: as it came.
@@ -194,6 +229,12 @@ bool OdometryPairing::Follows(const Odometry& odometry, const Pose2& logged) con
 }
 
 void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot, const Pose2& rate) {
+  Hand(scan, During(*scan), T_odom_robot, rate, true);
+}
+
+// Gives the pair to the sink.
+void OdometryPairing::Hand(const std::shared_ptr<const Scan>& scan, std::vector<Odometry> during,
+                           const Pose2& T_odom_robot, const Pose2& rate, bool has_odometry) {
   // Unsigned, because a broken clock may be anywhere in int64.
   const auto robot_time = static_cast<std::uint64_t>(scan->stamp);
   auto stamp = static_cast<Stamp>(robot_time + set_back_ns_);
@@ -201,14 +242,12 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
     stamp = static_cast<Stamp>(static_cast<std::uint64_t>(*last_paired_) + kIntervalNs);
     set_back_ns_ = static_cast<std::uint64_t>(stamp) - robot_time;
   }
-  if (last_paired_ && NanosBetween(*last_paired_, stamp) > Nanos(options_.max_pause_s))
-    passage_ = std::max(passage_, Passage::kPaused);
+  if (last_paired_ && NanosBetween(*last_paired_, stamp) > Nanos(options_.max_pause_s)) Note(Passage::kPaused);
   // Before the first pair nothing is known that could be lost.
   if (!last_paired_) passage_ = Passage::kDriven;
   last_paired_ = stamp;
-  std::vector<Odometry> during = During(*scan);
   sink_.paired({scan, WithoutMotion(scan, during, options_.rolling.deskew), T_odom_robot, stamp,
-                std::exchange(passage_, Passage::kDriven), std::move(during), rate});
+                std::exchange(passage_, Passage::kDriven), std::move(during), rate, has_odometry});
 }
 
 void OdometryPairing::SetLag(double lag_s) {
@@ -307,6 +346,7 @@ void OdometryPairing::Finish() {
   odometry_gate_.Finish();
   scan_gate_.Finish();
   Flush();
+  if (!newest_) PairWithoutOdometry();
   while (!scans_.empty()) {
     const auto scan = std::move(scans_.front());
     scans_.pop_front();

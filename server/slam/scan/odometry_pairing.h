@@ -7,6 +7,10 @@
 // the estimator still grows (PairedScan::stamp). It also says what lies between a pair and the one before it (Passage):
 // a pause, and odometry that cannot be that of one drive. Odometry is used on the clock of the scans, and corrected for
 // the wheels of the robot, as the options say. Memory is bounded. Not thread-safe.
+//
+// A robot that sends no odometry: when scans have waited for the first sample as long as the options say, they and all
+// later ones are paired without odometry (PairedScan::has_odometry), as soon as they come. From the first sample on,
+// scans are paired with odometry again; the first one that is says so (Passage::kOdometryBegan).
 #pragma once
 
 #include <cstdint>
@@ -31,7 +35,9 @@ struct PairingOptions {
   double max_stamp_jump_s = 10.0;
   std::int64_t jump_confirmations = 5;
   std::int64_t max_waiting_scans = 64;
-  std::int64_t max_odometry = 1024;  // A scan that takes longer than so many samples cannot be used.
+  double no_odometry_after_s = 2.0;
+  std::int64_t no_odometry_after_scans = 30;  // Below the window of a client, which else waits for the server.
+  std::int64_t max_odometry = 1024;           // A scan that takes longer than so many samples cannot be used.
   double max_pause_s = 2.0;
   double max_speed_m_s = 3.0;
   // No keys of the configuration: DriveLimits.
@@ -44,12 +50,15 @@ struct PairingOptions {
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
-// What lies between a scan and the one before it. If several apply, the one later in this list counts.
+// What lies between a scan and the one before it. If several of the first four apply, the last of them counts.
 enum class Passage : std::uint8_t {
   kDriven = 0,  // The robot was watched all the way.
   kPaused,      // Scans are missing for some time. Odometry says how the robot moved, if nobody carried it.
   kUnwatched,   // As kPaused, but its length is unknown, or another client continues.
   kUnknown,     // The odometry began anew or jumped: nothing says where the robot is now.
+  // As kDriven, but this is the first scan with odometry after others without. If another of these applies as well,
+  // kUnknown counts.
+  kOdometryBegan,
 };
 
 struct PairedScan {
@@ -62,6 +71,7 @@ struct PairedScan {
   // Speed at the stamp, as odometry shows it: per second, in the frame of the robot. Zero where odometry between the
   // scans is too sparse to show it.
   Pose2 rate{};
+  bool has_odometry = true;  // Otherwise T_odom_robot is the identity, and `during` says that the robot stands.
 };
 
 class OdometryPairing {
@@ -81,9 +91,11 @@ class OdometryPairing {
   // From now on both streams come from another client, which numbers from the beginning. Nobody has watched the robot
   // since the last sample, for an unknown time. Scans that still wait for odometry are dropped.
   void NewClient();
-  // Call this when no more odometry will come. A waiting scan that began before the last sample is paired as usual, and
-  // the robot is taken to stand after that sample. A later scan is paired with the last sample if that is at most
-  // max_gap_s old, and is dropped otherwise.
+  // Whether scans are paired without odometry, because the robot sends none.
+  [[nodiscard]] bool without_odometry() const { return last_paired_ && !newest_; }
+  // Call this when no more odometry will come. Without any odometry, waiting scans are paired without. A waiting scan
+  // that began before the last sample is paired as usual, and the robot is taken to stand after that sample. A later
+  // scan is paired with the last sample if that is at most max_gap_s old, and is dropped otherwise.
   void Finish();
 
   [[nodiscard]] std::size_t waiting() const { return scans_.size(); }
@@ -104,7 +116,7 @@ class OdometryPairing {
   static void Members(Archive& archive, auto& self) {
     archive(self.scans_, self.odometry_, self.last_paired_, self.set_back_ns_, self.odometry_refused_, self.passage_,
             self.newest_, self.time_known_, self.scan_gate_, self.odometry_gate_);
-    archive.Require(self.passage_ <= Passage::kUnknown, "a passage");
+    archive.Require(self.passage_ <= Passage::kOdometryBegan, "a passage");
     if (self.Corrects()) archive(self.logged_, self.corrected_);
     if constexpr (Archive::kReads) {
       self.lag_ns_ = 0;
@@ -122,6 +134,9 @@ class OdometryPairing {
   void ScanClockSetBack(Stamp last);
   void OdometryClockSetBack(Stamp last);
   void DropWaitingScans();
+  void Note(Passage passage);
+  [[nodiscard]] bool WaitsInVain() const;
+  void PairWithoutOdometry();
   // The time of the scan on the clock of the odometry.
   [[nodiscard]] Stamp TimeOf(const Scan& scan) const;
   [[nodiscard]] Pose2 RateAt(Stamp time) const;
@@ -132,6 +147,8 @@ class OdometryPairing {
   [[nodiscard]] bool Follows(const Odometry& odometry, const Pose2& logged) const;
   void Flush();
   void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot, const Pose2& rate);
+  void Hand(const std::shared_ptr<const Scan>& scan, std::vector<Odometry> during, const Pose2& T_odom_robot,
+            const Pose2& rate, bool has_odometry);
 
   PairingOptions options_;
   Sink sink_;

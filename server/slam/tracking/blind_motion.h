@@ -40,6 +40,7 @@ class BlindMotion {
   BlindMotion(const OdometryNoise& noise, bool use_odometry, double lost_after_m)
       : noise_(noise), use_odometry_(use_odometry), lost_after_m_(lost_after_m) {}
 
+  void UseOdometry(bool use) { use_odometry_ = use; }
   // `T_track_keyframe` is the pose of the last keyframe.
   void Add(const TrackStep& step, const Pose2& T_track_keyframe) {
     unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step.moved_m;

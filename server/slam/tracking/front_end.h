@@ -115,6 +115,16 @@ class FrontEnd {
   [[nodiscard]] std::optional<Pose2> LastStep() const;
   // Makes the scan just tracked part of the reference.
   void AddKeyframe(const ScanView& view);
+  // From now on odometry is used, or the scans alone and this matcher (FrontEndOptions::use_odometry).
+  void UseOdometry(bool use, ScanMatcher matcher) {
+    options_.use_odometry = use;
+    matcher_ = std::move(matcher);
+  }
+  // Odometry before the scan just tracked says nothing about the motion since.
+  void ForgetEarlierOdometry() {
+    while (history_.size() > 1) history_.pop_front();
+    unmatched_m_ = 0.0;
+  }
   // Forgets all scans: the next one is at the identity again.
   void Restart();
   // Expresses everything in another frame `new`; the old one is `old`.

@@ -89,9 +89,15 @@ Result<LogSteps> MeasureSteps(const std::filesystem::path& log, const LogStepOpt
                               const slam::ParallelFor& parallel_for) {
   StepTaker taker(options, parallel_for);
   int unusable = 0;
-  slam::OdometryPairing pairing(
-      options.slam.pairing, {.paired = [&](slam::PairedScan&& pair) { taker.Take(*pair.at_stamp, pair.T_odom_robot); },
-                             .dropped = [&](const Scan&, DropReason) { ++unusable; }});
+  slam::OdometryPairing pairing(options.slam.pairing, {.paired =
+                                                           [&](slam::PairedScan&& pair) {
+                                                             if (!pair.has_odometry) {
+                                                               ++unusable;
+                                                               return;
+                                                             }
+                                                             taker.Take(*pair.at_stamp, pair.T_odom_robot);
+                                                           },
+                                                       .dropped = [&](const Scan&, DropReason) { ++unusable; }});
   auto summary = ReadRecording(log, options.reader, [&](LogRecord&& record) {
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       if (ValidateOdometry(*odometry)) pairing.Add(*odometry);

@@ -156,6 +156,7 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
             ++report.scans_used;
             report.keyframes += outcome.keyframe ? 1 : 0;
             report.not_localized += outcome.localized ? 0 : 1;
+            report.scans_alone += outcome.scans_alone ? 1 : 0;
             if (known.grid == nullptr || outcome.localized)
               robot.online.push_back({outcome.stamp, outcome.T_map_robot});
           },
@@ -171,6 +172,7 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
   const auto add = [&](LogRecord&& record) {
     times.BeginRecord();
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
+      report.log_has_odometry = true;
       if (ValidateOdometry(*odometry)) {
         pipeline.Add(*odometry);
       } else {
@@ -235,9 +237,12 @@ std::string ReportText(const OfflineReport& report) {
   out << "           " << report.wall_s << " s in all, " << report.cpu_s << " s of processor time\n";
   out << "landmarks  " << report.landmarks << '\n';
   for (const LearnedValue& learned : report.learned)
-    if (learned.applied)
+    if (learned.applied && learned.name != kLearnedNoOdometry && learned.name != kLearnedOdometryStands)
       out << "learned    " << learned.name << ' ' << std::setprecision(4) << learned.value << " +- " << learned.sigma
           << std::setprecision(2) << (learned.unit == "1" ? "" : ' ' + learned.unit) << '\n';
+  if (report.scans_alone > 0)
+    out << "odometry   not used for " << report.scans_alone << " scans: "
+        << (report.log_has_odometry ? "it came later or stands still although the scans move\n" : "there is none\n");
   out << "memory     " << report.peak_rss_mib << " MiB at the most\n";
   return out.str();
 }
@@ -267,6 +272,7 @@ Json JsonOf(const OfflineReport& report) {
           {"peak_rss_mib", report.peak_rss_mib},
           {"keyframes", report.keyframes},
           {"not_localized", report.not_localized},
+          {"scans_alone", report.scans_alone},
           {"dropped", std::move(dropped)},
           {"learned", std::move(learned)},
           {"log_complaints", report.log.complaint_count}};

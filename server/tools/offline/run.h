@@ -35,6 +35,8 @@ struct OfflineReport {
   std::uint64_t scans_used = 0;
   std::uint64_t keyframes = 0;
   std::uint64_t not_localized = 0;  // Scans whose pose was reported as lost.
+  std::uint64_t scans_alone = 0;    // Scans without odometry that could be used (ScanOutcome).
+  bool log_has_odometry = false;
   std::array<std::uint64_t, kDropReasonCount> dropped{};
   std::uint64_t odometry_dropped = 0;
   std::size_t landmarks = 0;

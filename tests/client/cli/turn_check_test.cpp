@@ -48,6 +48,21 @@ std::string Warnings(const std::vector<LogRecord>& records) {
   return text;
 }
 
+TEST(TurnCheck, OdometryThatStandsWhileTheScansMoveIsAnError) {
+  std::vector<LogRecord> records = Drive(0.0);
+  EXPECT_LT(TurnsOf(records).turned_while_standing_rad, 0.2);
+  for (LogRecord& record : records)
+    if (auto* odometry = std::get_if<Odometry>(&record)) odometry->T_odom_robot = {};
+  EXPECT_GT(TurnsOf(records).turned_while_standing_rad, 1.0);
+  LogCheck check;
+  for (const LogRecord& record : records) check.Add(record);
+  const LogReport report = check.Finish({});
+  EXPECT_TRUE(report.has_errors());
+  EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(), [](const Finding& finding) {
+    return finding.error && finding.what.find("does not move although the scans do") != std::string::npos;
+  }));
+}
+
 TEST(TurnCheck, FindsTheLag) {
   for (const double lag_s : {0.0, 0.16, -0.1}) {
     const TurnFinding finding = TurnsOf(Drive(lag_s));

@@ -123,6 +123,22 @@ TEST(Fleet, RecordsComeInTheOrderOfTheirStampsAtTheirRates) {
   }
 }
 
+TEST(Fleet, RobotsMaySendNoOdometryAndDriveTheSame) {
+  FleetOptions options;
+  options.robots = 1;
+  Fleet with = Make("building", options);
+  options.odometry_hz = 0.0;
+  Fleet without = Make("building", options);
+  auto records = Take(with, 5.0);
+  std::erase_if(records, [](const FleetRecord& one) { return std::holds_alternative<Odometry>(one.record); });
+  const auto silent = Take(without, 5.0);
+  ASSERT_EQ(silent.size(), records.size());
+  for (std::size_t i = 0; i < silent.size(); ++i) {
+    ASSERT_TRUE(std::holds_alternative<Scan>(silent[i].record));
+    EXPECT_EQ(std::get<Scan>(silent[i].record).ranges_m, std::get<Scan>(records[i].record).ranges_m);
+  }
+}
+
 TEST(Fleet, TruthHasOnePosePerScanAtItsStamp) {
   FleetOptions options;
   options.robots = 2;

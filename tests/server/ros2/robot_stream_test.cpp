@@ -120,6 +120,36 @@ TEST_F(RosRobot, OfTheSharedTransformsOnlyItsOwnFramesAreItsOdometry) {
   EXPECT_EQ(robot_.odom_frame(), "r1/odom");
 }
 
+TEST_F(RosRobot, WithoutOdometryItIsFollowedByItsScansAlone) {
+  robot_.SetPublishers(true, false, now_);
+  robot_.Take(Mounting("base_footprint"), {kStatic, 1}, now_);
+  Scan(1);
+  now_ += seconds(4);
+  Scan(2);
+  EXPECT_EQ(inbound_.size(), 0U) << "odometry may come";
+  EXPECT_THAT(Problems(), Not(Contains(HasSubstr("scans alone"))));
+  now_ += seconds(1);
+  Scan(3);
+  const std::vector<InboundValue> values = Everything();
+  ASSERT_EQ(values.size(), 2U);
+  EXPECT_TRUE(std::holds_alternative<SessionRequest>(values[0]));
+  EXPECT_NEAR(std::get<ScanArrival>(values[1]).scan->T_robot_laser.x, 0.2, 1e-12);
+  EXPECT_EQ(robot_.odom_frame(), "base_footprint");
+  EXPECT_THAT(Problems(), Contains(HasSubstr("scans alone")));
+  // It begins after all.
+  Odom(4);
+  EXPECT_EQ(robot_.odom_frame(), "odom");
+  EXPECT_EQ(Pushed<OdometryArrival>().size(), 1U);
+}
+
+TEST_F(RosRobot, OdometryThatIsPublishedIsWaitedFor) {
+  Mount();
+  Scan(1);
+  now_ += seconds(60);
+  Scan(2);
+  EXPECT_EQ(inbound_.size(), 0U);
+}
+
 TEST_F(RosRobot, TriesAgainWhereItIsRefused) {
   Open();
   robot_.Take(Refusal(StatusCode::kAlreadyExists, "another live client streams as 'r1'"), now_);

@@ -1,6 +1,9 @@
 // The records of one robot that drives through the world `building`.
 #pragma once
 
+#include <optional>
+#include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -28,6 +31,27 @@ inline Drive SimulatedDrive(double seconds) {
     drive.records.push_back(fleet->Next().record);
     stamp = std::visit([](const auto& record) { return record.stamp; }, drive.records.back());
   }
+  return drive;
+}
+
+// The same drive with another odometry: "none", "late" (from the first third of the records on), "stands" (from then on
+// it stands), "returns" (it stands in the second third).
+inline Drive WithOdometry(Drive drive, std::string_view kind) {
+  std::vector<LogRecord> records;
+  std::optional<Pose2> stands;
+  const std::size_t third = drive.records.size() / 3;
+  for (std::size_t i = 0; i < drive.records.size(); ++i) {
+    LogRecord& record = drive.records[i];
+    if (auto* const odometry = std::get_if<Odometry>(&record)) {
+      if (kind == "none" || (kind == "late" && i < third)) continue;
+      if (i >= third && (kind == "stands" || (kind == "returns" && i < 2 * third))) {
+        if (!stands) stands = odometry->T_odom_robot;
+        odometry->T_odom_robot = *stands;
+      }
+    }
+    records.push_back(std::move(record));
+  }
+  drive.records = std::move(records);
   return drive;
 }
 

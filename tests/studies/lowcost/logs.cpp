@@ -27,7 +27,47 @@ std::vector<RealRobot> RealRobots() {
           {"slambot_rplidara1_6AUG14_16m", turns(0.182, true, 0.0)}};
 }
 
+// The log without its odometry, or with odometry that stands where it was at the start.
+StudyLog WithoutOdometry(StudyLog log) {
+  std::erase_if(log.records, [](const LogRecord& record) { return std::holds_alternative<Odometry>(record); });
+  return log;
+}
+StudyLog WithStandingOdometry(StudyLog log) {
+  for (LogRecord& record : log.records)
+    if (auto* odometry = std::get_if<Odometry>(&record)) odometry->T_odom_robot = {};
+  return log;
+}
+
 }  // namespace
+
+void RunScansAlone(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Without odometry");
+  report.Text(
+      "The same logs without their odometry, and with odometry that stands, beside those with it; no option is set. "
+      "The scans by which paths are judged are moved by the true odometry. A corridor longer than the lidar sees comes "
+      "out too short.");
+  Table table(
+      {"log", "odometry", "scans used", "not localized", "blur (mm)", "thickness (mm)", "smoothed (mm)", "length (m)"});
+  for (const RealRobot& robot : RealRobots()) {
+    const auto log = OpenRealLog(context, "lowcost/" + robot.log, context.Pick(0, 150), robot.timing);
+    if (!log) continue;
+    const StudyLog still = AllAtOnce(*log);
+    const auto add = [&](const char* odometry, const StudyLog& given) {
+      const Mapped mapped = MapLog(context, given, {});
+      const MapCrispness online = CrispnessOf(still, mapped.run.online);
+      table.Add({robot.log, odometry, Count(static_cast<long long>(mapped.run.online.size())),
+                 Count(static_cast<long long>(mapped.run.not_localized)), Number(1e3 * online.blur_m, 1),
+                 Number(1e3 * online.thickness_m, 1), Number(1e3 * CrispnessOf(still, mapped.smoothed).thickness_m, 1),
+                 Number(LengthOf(mapped.run.online), 2)});
+      return mapped.run.online.size();
+    };
+    const std::size_t with = add("used", *log);
+    if (add("none", WithoutOdometry(*log)) < with) report.Warn(robot.log + ": scans are lost without odometry");
+    add("stands", WithStandingOdometry(*log));
+  }
+  report.Add(table, "alone");
+}
 
 void RunLowcostLogs(StudyContext& context) {
   Report& report = context.report;

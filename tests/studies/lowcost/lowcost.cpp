@@ -216,6 +216,7 @@ void RunUnknown(StudyContext& context) {
 
 void RunLowcost(StudyContext& context) {
   if (context.Wants("logs")) RunLowcostLogs(context);
+  if (context.Wants("alone")) RunScansAlone(context);
   if (context.Wants("rates")) RunRates(context);
   if (context.Wants("standing")) RunStanding(context);
   if (context.Wants("lidars")) RunLidars(context);

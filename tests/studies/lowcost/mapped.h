@@ -29,6 +29,8 @@ struct Mapped {
 
 // The part of the study on real logs.
 void RunLowcostLogs(StudyContext& context);
+// The same without their odometry.
+void RunScansAlone(StudyContext& context);
 // Robots with wrong wheels and late scans, which the estimator learns while they drive.
 void RunLearning(StudyContext& context);
 // The same on drives whose wheels are as wrong as usual: whether what was learned of turns makes headings better.

@@ -15,6 +15,7 @@ struct Pairing {
                             pairs.push_back({p.scan->stamp, p.T_odom_robot});
                             passages.push_back(p.passage);
                             rates.push_back(p.rate);
+                            with_odometry.push_back(p.has_odometry);
                             grows &= pairs.size() == 1 || p.stamp > estimator_time;
                             estimator_time = p.stamp;
                           },
@@ -39,8 +40,9 @@ struct Pairing {
     bool operator==(const Paired&) const = default;
   };
   std::vector<Paired> pairs;
-  std::vector<Passage> passages;  // Of each pair,
-  std::vector<Pose2> rates;       // and PairedScan::rate.
+  std::vector<Passage> passages;    // Of each pair,
+  std::vector<Pose2> rates;         // PairedScan::rate
+  std::vector<bool> with_odometry;  // and PairedScan::has_odometry.
   std::vector<std::pair<Stamp, DropReason>> drops;
   bool grows = true;  // The estimator's time, from pair to pair.
   Stamp estimator_time = 0;
