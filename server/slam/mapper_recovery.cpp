@@ -321,6 +321,7 @@ ScanOutcome Mapper::State::GoOnAt(const Recovery::Found& found, Keyframe keyfram
   blind.Found(R * place.covariance * R.transpose());
   recovery.End();
   self_check.Forget();
+  loops.ForgetUnconfirmed();
   Regained regained;
   if (found.elsewhere) {
     regained.elsewhere = {place.T_map_robot, place.covariance};

@@ -21,12 +21,6 @@ SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
 
 }  // namespace
 
-bool OnePerCell::Takes(const Eigen::Vector2d& p) {
-  const auto x = static_cast<std::int64_t>(std::floor(p.x() / cell_m_));
-  const auto y = static_cast<std::int64_t>(std::floor(p.y() / cell_m_));
-  return taken_.insert((x << 32) ^ (y & 0xffffffff)).second;
-}
-
 IndexedSurfaces::IndexedSurfaces(std::vector<SurfacePoint> given, double cell_scale)
     : surfaces(std::move(given)),
       pyramid(surfaces, cell_scale * kSearchCellM, cell_scale * kLikelihoodReachM, kMapLevels),

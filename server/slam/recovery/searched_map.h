@@ -3,14 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <memory>
 #include <optional>
-#include <unordered_set>
 #include <vector>
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
+#include "server/slam/loops/region.h"
 #include "server/slam/loops/region_search.h"
 #include "server/slam/loops/visibility.h"
 #include "server/slam/matching/point_index.h"
@@ -64,17 +63,6 @@ class PathMap final : public SearchedMap {
   const PlaceSearchOptions& options_;
   double near_m_;
   std::optional<Eigen::Vector2d> middle_;
-};
-
-// Takes the first point of each cell of a raster.
-class OnePerCell {
- public:
-  explicit OnePerCell(double cell_m) : cell_m_(cell_m) {}
-  bool Takes(const Eigen::Vector2d& p);
-
- private:
-  double cell_m_;
-  std::unordered_set<std::int64_t> taken_;
 };
 
 }  // namespace cairn::slam
