@@ -29,7 +29,7 @@ constexpr double kEverywhereEveryM = 4.0;
 // Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
 // its path is waited for by nobody. One that is lost, or may have been carried, is to be found soon.
 constexpr int kBlocksOnPath = 60'000;
-constexpr int kBlocksLost = 200'000;
+constexpr int kBlocksLost = 100'000;
 
 }  // namespace
 
