@@ -53,10 +53,7 @@ double LoopSearch::Reach(double way_m) const {
   return WindowAround({}, way_m, options_).reach_m;
 }
 
-// A keyframe does one comparison at most, because a robot waits for its pose: the first ones of a search compare one
-// candidate each, the next ones confirm what those have found, and the one after that gives the loop to be closed.
-// Which it is follows from the keyframes since the search began, and a loop is confirmed if it was seen from one after
-// those that compare; so a restart needs to know no more than when the search began and what was found.
+// A keyframe does one comparison at most, because a robot waits for its pose.
 std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const std::size_t now = shapes.size() - 1;
@@ -64,20 +61,20 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& 
   if (!options_.enabled) return std::nullopt;
   const auto began = static_cast<std::size_t>(
       std::ranges::lower_bound(shapes, searched_at_m_, {}, &KeyframeShape::travelled_m) - shapes.begin());
-  if (!unconfirmed_.empty() && unconfirmed_.back().recent >= began + kMaxCandidates) {
+  if (!unconfirmed_.empty() && unconfirmed_.back().recent >= began &&
+      PartAt(unconfirmed_.back().recent, began).confirms) {
     const LoopClosure confirmed = SeenFrom(now, unconfirmed_.back(), shapes);
     unconfirmed_.clear();
     return confirmed;
   }
-  const std::size_t part = now - began;
-  if (0 < part && part < kMaxCandidates) {
-    CompareCandidate(part, trail, path);
-    return std::nullopt;
-  }
-  const auto found = std::ranges::find_if(unconfirmed_, [began](const auto& one) { return one.recent >= began; });
-  if (part >= kMaxCandidates && part - kMaxCandidates < static_cast<std::size_t>(unconfirmed_.end() - found)) {
-    const LoopClosure closure = SeenFrom(now, found[static_cast<std::ptrdiff_t>(part - kMaxCandidates)], shapes);
-    if (Confirms(trail, path, closure, began)) unconfirmed_.assign(1, closure);
+  const Part part = PartAt(now, began);
+  if (now > began && part.candidate < kMaxCandidates) {
+    if (!part.confirms) {
+      CompareCandidate(part.candidate, trail, path);
+    } else if (const LoopClosure closure = SeenFrom(now, unconfirmed_.back(), shapes);
+               Confirms(trail, path, closure, began)) {
+      unconfirmed_.push_back(closure);
+    }
     return std::nullopt;
   }
   if (here_m - searched_at_m_ < options_.every_m) return std::nullopt;
@@ -86,6 +83,22 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& 
     unconfirmed_.pop_front();
   CompareCandidate(0, trail, path);
   return std::nullopt;
+}
+
+// Each candidate is compared at one keyframe, and if that has found something, it is confirmed at the next one. So what
+// a keyframe does follows from where the search began and at which keyframes something was found, and a restart needs
+// to know no more than that.
+LoopSearch::Part LoopSearch::PartAt(std::size_t keyframe, std::size_t began) const {
+  Part part;
+  for (std::size_t k = began; k < keyframe && part.candidate < kMaxCandidates; ++k) {
+    const bool found = std::ranges::find(unconfirmed_, k, &LoopClosure::recent) != unconfirmed_.end();
+    if (found && !part.confirms) {
+      part.confirms = true;
+    } else {
+      part = {part.candidate + 1, false};
+    }
+  }
+  return part;
 }
 
 void LoopSearch::CompareCandidate(std::size_t number, const Trail& trail, const PosePath& path) {

@@ -72,6 +72,13 @@ class LoopSearch {
   }
 
  private:
+  // What a search does with a keyframe: it compares a candidate, or confirms what that comparison has found.
+  struct Part {
+    std::size_t candidate = 0;
+    bool confirms = false;
+  };
+  // With this keyframe, if the search began with keyframe `began`.
+  [[nodiscard]] Part PartAt(std::size_t keyframe, std::size_t began) const;
   // Compares the old keyframe that is the n-th best candidate.
   void CompareCandidate(std::size_t number, const Trail& trail, const PosePath& path);
   [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const PosePath& path) const;
@@ -91,7 +98,7 @@ class LoopSearch {
   LoopOptions options_;
   PointToLineOptions align_;
   double searched_at_m_ = 0.0;  // Where the last search began.
-  // The comparisons that found something, or the one of them that is confirmed.
+  // What comparisons have found. If the last one was found where a search confirms, it is the loop to be closed.
   std::deque<LoopClosure> unconfirmed_;
 };
 
