@@ -318,6 +318,7 @@ ScanOutcome Mapper::State::GoOnAt(const Recovery::Found& found, Keyframe keyfram
   blind.Found(Rotated(place.covariance, -T_map_last.theta));
   recovery.End();
   self_check.Forget();
+  loops.ForgetUnconfirmed();
   Regained regained;
   if (found.elsewhere) {
     regained.elsewhere = {place.T_map_robot, place.covariance};

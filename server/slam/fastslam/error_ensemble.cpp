@@ -54,7 +54,10 @@ void ErrorEnsemble::Resample(double lost) {
   LoseAncestors(robot_, lost * robot_share, partner);
   auto at = path_.rbegin();
   for (; at != path_.rend() && (*at)->spread_share > kNothingLeft; ++at) {
-    auto kept = std::make_shared<Kept>(**at);
+    // Only a checkpoint, which may be written on another thread, shares it, and must not see the change. Holding it
+    // once more puts what that thread has read before the change (as in shared_sequence.h).
+    const bool shared = at->use_count() > 1;
+    auto kept = shared ? std::make_shared<Kept>(**at) : std::const_pointer_cast<Kept>(*at);
     LoseAncestors(kept->errors, lost * kept->spread_share, partner);
     kept->spread_share *= 1.0 - lost;
     *at = std::move(kept);
@@ -73,7 +76,7 @@ void ErrorEnsemble::LoseAncestors(Errors& errors, double share, int partner) con
 }
 
 void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
-  path_.assign(keyframes, std::make_shared<const Kept>());
+  path_.assign(keyframes, std::make_shared<Kept>());
   frozen_path_.Forget();
   Begin(T_map_robot, covariance);
 }
@@ -92,7 +95,7 @@ void ErrorEnsemble::MoveMap(std::span<const Pose2> T_new_old) {
   for (std::size_t k = 0; k < path_.size(); ++k) {
     if (T_new_old[k] == Pose2{}) continue;
     unmoved = std::min(unmoved, k);
-    path_[k] = std::make_shared<const Kept>(Kept{J_new_old(T_new_old[k]) * path_[k]->errors, path_[k]->spread_share});
+    path_[k] = std::make_shared<Kept>(Kept{J_new_old(T_new_old[k]) * path_[k]->errors, path_[k]->spread_share});
   }
   frozen_path_.ForgetFrom(unmoved);
   robot_ = J_new_old(T_new_old.back()) * robot_;

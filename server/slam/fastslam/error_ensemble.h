@@ -57,7 +57,7 @@ class ErrorEnsemble {
   void Resample(double lost);
   // Appends the robot's error to the path. `spread_share` is the share of its variance over which the
   // particles still spread.
-  void Keep(double spread_share) { path_.push_back(std::make_shared<const Kept>(Kept{robot_, spread_share})); }
+  void Keep(double spread_share) { path_.push_back(std::make_shared<Kept>(Kept{robot_, spread_share})); }
   // Sets the errors of all past keyframes to zero, and gives the robot's error this covariance of the pose,
   // (x, y, theta) in map.
   void Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance);
@@ -106,7 +106,8 @@ class ErrorEnsemble {
 
   Rng rng_;
   Errors robot_ = Errors::Zero();
-  std::vector<std::shared_ptr<const Kept>> path_;  // Immutable, so that a checkpoint shares them.
+  // A checkpoint shares them, so that one with another owner is never changed.
+  std::vector<std::shared_ptr<const Kept>> path_;
   FrozenBlocks<std::shared_ptr<const Kept>> frozen_path_;
 };
 

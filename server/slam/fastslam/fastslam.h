@@ -202,8 +202,9 @@ Association FastSlam<LandmarkModel>::Associate(std::size_t particle, const Landm
   const Eigen::Vector2d p_map = belief.T_map_robot * sighting.p_robot;
   AssociationVote vote;
   for (const std::size_t slot : slots) {
-    if (slot >= map.size() || map[slot].sightings == 0) continue;
+    if (slot >= map.size()) continue;
     const Entry& entry = map[slot];
+    if (entry.sightings == 0) continue;
     if ((entry.landmark.p_map() - p_map).norm() > kMatchDistanceM) continue;
     if (!SlopesAgree(sighting, belief.T_map_robot.theta, entry.landmark.slope(), index_.signature(slot),
                      options_.landmarks))
@@ -224,15 +225,15 @@ void FastSlam<LandmarkModel>::Remember(std::size_t particle, const LandmarkSight
   const Pose2& T_map_robot = set_[particle].T_map_robot;
   while (map.size() <= sighting.slot) map.Append({});
   const std::size_t slot = association.decision == AssociationDecision::kKnown ? association.slot : sighting.slot;
-  if (association.decision == AssociationDecision::kKnown) {
-    map.Mutable(slot).landmark.Learn(T_map_robot, measurement);
-  } else if (association.decision == AssociationDecision::kNew && map[slot].sightings == 0) {
-    map.Mutable(slot).landmark = LandmarkModel::Initial(T_map_robot, measurement);
-    map.Mutable(slot).first_keyframe = static_cast<std::uint32_t>(set_[particle].path.size());
-  } else {
-    return;
-  }
+  const bool known = association.decision == AssociationDecision::kKnown;
+  if (!known && (association.decision != AssociationDecision::kNew || map[slot].sightings > 0)) return;
   Entry& entry = map.Mutable(slot);
+  if (known) {
+    entry.landmark.Learn(T_map_robot, measurement);
+  } else {
+    entry.landmark = LandmarkModel::Initial(T_map_robot, measurement);
+    entry.first_keyframe = static_cast<std::uint32_t>(set_[particle].path.size());
+  }
   entry.last_observed_m = travelled_m;
   ++entry.sightings;
   index_.Grow(slot, entry.landmark.p_map());

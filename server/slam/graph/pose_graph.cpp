@@ -8,13 +8,10 @@
 #include <memory>
 
 #include "common/geometry/pose_difference.h"
+#include "server/slam/graph/loop_loss.h"
 
 namespace cairn::slam {
 namespace {
-
-// Half or twice of these changes no error by more than 1 % (study `sensitivity`).
-constexpr double kLoopLoss = 3.0;   // Standard deviations of a loop beyond which its influence is reduced.
-constexpr double kWidening = 10.0;  // Ratio of the widths of the loss in two of its three steps.
 
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -118,7 +115,7 @@ PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRe
 
   narrow_to(1.0);
   problem.Evaluate({}, &result.cost_before, nullptr, nullptr, nullptr);
-  for (const double widening : {kWidening * kWidening, kWidening, 1.0}) {
+  for (const double widening : {kLoopLossWidening * kLoopLossWidening, kLoopLossWidening, 1.0}) {
     narrow_to(widening);
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);

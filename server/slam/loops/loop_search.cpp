@@ -53,26 +53,66 @@ double LoopSearch::Reach(double way_m) const {
   return WindowAround({}, way_m, options_).reach_m;
 }
 
+// A keyframe does one comparison at most, because a robot waits for its pose.
 std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
-  const double here_m = shapes.back().travelled_m;
-  if (!options_.enabled || here_m - searched_at_m_ < options_.every_m) return std::nullopt;
+  const std::size_t now = shapes.size() - 1;
+  const double here_m = shapes[now].travelled_m;
+  if (!options_.enabled) return std::nullopt;
+  const auto began = static_cast<std::size_t>(
+      std::ranges::lower_bound(shapes, searched_at_m_, {}, &KeyframeShape::travelled_m) - shapes.begin());
+  if (!unconfirmed_.empty() && unconfirmed_.back().recent >= began &&
+      PartAt(unconfirmed_.back().recent, began).confirms) {
+    const LoopClosure confirmed = SeenFrom(now, unconfirmed_.back(), shapes);
+    unconfirmed_.clear();
+    return confirmed;
+  }
+  const Part part = PartAt(now, began);
+  if (now > began && part.candidate < kMaxCandidates) {
+    if (!part.confirms) {
+      CompareCandidate(part.candidate, trail, path);
+    } else if (const LoopClosure closure = SeenFrom(now, unconfirmed_.back(), shapes);
+               Confirms(trail, path, closure, began)) {
+      unconfirmed_.push_back(closure);
+    }
+    return std::nullopt;
+  }
+  if (here_m - searched_at_m_ < options_.every_m) return std::nullopt;
   searched_at_m_ = here_m;
   while (!unconfirmed_.empty() && here_m - shapes[unconfirmed_.front().recent].travelled_m > kConfirmWithinM)
     unconfirmed_.pop_front();
-
-  std::vector<LoopClosure> found;
-  for (const std::size_t old : Candidates(trail, path)) {
-    const Pose2 guess = Between(path[old], path[shapes.size() - 1]);
-    if (const auto closure = Compare(trail, old, guess, 0)) found.push_back(*closure);
-  }
-  for (const LoopClosure& closure : found) {
-    if (!Confirms(trail, path, closure)) continue;
-    unconfirmed_.clear();
-    return closure;
-  }
-  unconfirmed_.insert(unconfirmed_.end(), found.begin(), found.end());
+  CompareCandidate(0, trail, path);
   return std::nullopt;
+}
+
+// Each candidate is compared at one keyframe, and if that has found something, it is confirmed at the next one. So what
+// a keyframe does follows from where the search began and at which keyframes something was found, and a restart needs
+// to know no more than that.
+LoopSearch::Part LoopSearch::PartAt(std::size_t keyframe, std::size_t began) const {
+  Part part;
+  for (std::size_t k = began; k < keyframe && part.candidate < kMaxCandidates; ++k) {
+    const bool found = std::ranges::find(unconfirmed_, k, &LoopClosure::recent) != unconfirmed_.end();
+    if (found && !part.confirms) {
+      part.confirms = true;
+    } else {
+      part = {part.candidate + 1, false};
+    }
+  }
+  return part;
+}
+
+void LoopSearch::CompareCandidate(std::size_t number, const Trail& trail, const PosePath& path) {
+  const std::vector<std::size_t> candidates = Candidates(trail, path);
+  if (number >= candidates.size()) return;
+  const std::size_t old = candidates[number];
+  const Pose2 guess = Between(path[old], path[trail.size() - 1]);
+  if (const auto closure = Compare(trail, old, guess, 0)) unconfirmed_.push_back(*closure);
+}
+
+LoopClosure LoopSearch::SeenFrom(std::size_t keyframe, const LoopClosure& closure,
+                                 std::span<const KeyframeShape> shapes) {
+  const Pose2 step = Between(shapes[closure.recent].T_track_robot, shapes[keyframe].T_track_robot);
+  return {closure.old, keyframe, closure.T_old_recent * step, closure.covariance};
 }
 
 void LoopSearch::Retire(const Retirement& retirement) {
@@ -105,10 +145,12 @@ std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePa
 
 // Two stretches of 15 m that end some metres apart show nearly the same. Where that looks like another place, both
 // agree on the wrong one. So what has been seen since the earlier of the two must show the same by itself.
-bool LoopSearch::Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure) const {
+bool LoopSearch::Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure,
+                          std::size_t before) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const Pose2 guess = Between(path[closure.old], path[closure.recent]);
   for (const LoopClosure& earlier : unconfirmed_) {
+    if (earlier.recent >= before) break;
     if (shapes[closure.recent].travelled_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
     if (!Agree(earlier, closure, shapes)) continue;
     // It is the earliest one, since which the robot has seen the most.

@@ -56,10 +56,13 @@ class LoopSearch {
  public:
   explicit LoopSearch(const LoopOptions& options, const PointToLineOptions& align);
 
-  // Returns a large loop that the last keyframe closes, once it is confirmed. `path` is the believed path,
-  // one pose T_map_robot per keyframe.
+  // Returns a large loop that the last keyframe closes, once it is confirmed. To be called once after each keyframe,
+  // because a search is done in parts, one with each. `path` is the believed path, one pose T_map_robot per keyframe.
   [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const PosePath& path);
 
+  // The front-end has not followed the robot from the last keyframe to the next one: what was found before says nothing
+  // of where the robot is now.
+  void ForgetUnconfirmed() { unconfirmed_.clear(); }
   // Forgets the loops that are not confirmed yet if one of their keyframes is retired.
   void Retire(const Retirement& retirement);
 
@@ -69,18 +72,33 @@ class LoopSearch {
   }
 
  private:
+  // What a search does with a keyframe: it compares a candidate, or confirms what that comparison has found.
+  struct Part {
+    std::size_t candidate = 0;
+    bool confirms = false;
+  };
+  // With this keyframe, if the search began with keyframe `began`.
+  [[nodiscard]] Part PartAt(std::size_t keyframe, std::size_t began) const;
+  // Compares the old keyframe that is the n-th best candidate.
+  void CompareCandidate(std::size_t number, const Trail& trail, const PosePath& path);
   [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const PosePath& path) const;
   // Compares the surroundings of the last keyframe, as seen from keyframe `since` on, with those of `old`.
   [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old, const Pose2& T_old_recent_guess,
                                                    std::size_t since) const;
-  // Whether an unconfirmed loop agrees with `closure`, and with what has been seen since that one alone.
-  [[nodiscard]] bool Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure) const;
+  // Whether an unconfirmed loop, found before keyframe `before`, agrees with `closure`, and with what has been seen
+  // since that one alone.
+  [[nodiscard]] bool Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure,
+                              std::size_t before) const;
+  // The closure with another keyframe of the same stretch as the recent one.
+  [[nodiscard]] static LoopClosure SeenFrom(std::size_t keyframe, const LoopClosure& closure,
+                                            std::span<const KeyframeShape> shapes);
   [[nodiscard]] bool Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const;
   [[nodiscard]] double Reach(double way_m) const;
 
   LoopOptions options_;
   PointToLineOptions align_;
-  double searched_at_m_ = 0.0;
+  double searched_at_m_ = 0.0;  // Where the last search began.
+  // What comparisons have found. If the last one was found where a search confirms, it is the loop to be closed.
   std::deque<LoopClosure> unconfirmed_;
 };
 

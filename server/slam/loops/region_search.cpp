@@ -31,6 +31,9 @@ std::vector<Eigen::Vector2d> Spread(std::span<const Eigen::Vector2d> points) {
   return spread;
 }
 
+// Most blocks of the coarsest level whose bounds are kept: 1 MiB.
+constexpr std::size_t kMostKept = 1 << 18;
+
 // The first cell of a part.
 std::size_t BeginOf(std::size_t part, const LikelihoodPyramid::Pattern& pattern) {
   return part * pattern.cells.size() / LikelihoodPyramid::kParts;
@@ -194,7 +197,8 @@ PoseSearch::PoseSearch(std::span<const Eigen::Vector2d> points_curr, const Likel
 void PoseSearch::Begin(double min_score, std::span<const Exclusion> exclusions, bool any) {
   exclusions_.assign(exclusions.begin(), exclusions.end());
   any_ = any;
-  looked_at_all_ = false;
+  looked_at_coarsest_ = false;
+  next_row_ = 0;
   left_.clear();
   best_ = {};
   best_.sums.front() = static_cast<std::int32_t>(min_score * full_);
@@ -204,7 +208,8 @@ void PoseSearch::Begin(double min_score, std::span<const Exclusion> exclusions, 
 
 bool PoseSearch::GoOn(int blocks) {
   const int end = blocks < kMaxBlocks - scored_ ? scored_ + blocks : kMaxBlocks;
-  if (!looked_at_all_) LookAtAll();
+  if (!looked_at_coarsest_) looked_at_coarsest_ = LookOnAtCoarsest(end);
+  if (!looked_at_coarsest_) return false;
   // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
   while (!left_.empty() && scored_ <= kMaxBlocks && !(any_ && found_)) {
     if (scored_ > end) return false;
@@ -227,30 +232,40 @@ std::optional<RegionPeak> PoseSearch::peak() const {
   return RegionPeak{PoseOf(best_), best_.bound() / full_, complete};
 }
 
-// The blocks of the coarsest level.
-void PoseSearch::LookAtAll() {
-  looked_at_all_ = true;
+// Looks at the blocks of the coarsest level, row by row, until about `end` blocks are evaluated. Returns whether it has
+// looked at all.
+bool PoseSearch::LookOnAtCoarsest(int end) {
   const int level = pyramid_->levels() - 1, side = 1 << level;
-  std::vector<std::int64_t> bounds(static_cast<std::size_t>(2 * reach_cells_ / side + 1));  // Those of a row.
-  for (int turn = 0; turn < static_cast<int>(turned_.size()) && scored_ <= kMaxBlocks; ++turn) {
+  const auto in_row = static_cast<std::size_t>(2 * reach_cells_ / side + 1);  // And so many rows for each heading.
+  const std::size_t rows = turned_.size() * in_row;
+  std::vector<std::int64_t> bounds(in_row);
+  for (; next_row_ < rows && scored_ <= kMaxBlocks; ++next_row_) {
+    if (scored_ > end) return false;
+    scored_ += static_cast<int>(in_row);
+    const auto turn = static_cast<int>(next_row_ / in_row);
+    const int y = -reach_cells_ + side * static_cast<int>(next_row_ % in_row);
     const Pattern& pattern = turned_[static_cast<std::size_t>(turn)];
-    for (int y = -reach_cells_; y <= reach_cells_ && scored_ <= kMaxBlocks; y += side) {
-      scored_ += static_cast<int>(bounds.size());
+    if (const std::size_t known = next_row_ * in_row; known < coarsest_.size()) {
+      std::copy_n(coarsest_.begin() + static_cast<std::ptrdiff_t>(known), in_row, bounds.begin());
+    } else {
       pyramid_->SumsOfRow(pattern.cells, -reach_cells_, y, bounds);
-      int x = -reach_cells_;
-      for (const std::int64_t bound : bounds) {
-        Block block{turn, x, y, level, {}};
-        x += side;
-        if (bound <= best_.bound()) continue;
-        block.sums = LikelihoodPyramid::MostOf(pattern);
-        block.sums.front() = static_cast<std::int32_t>(bound);
-        if (!Excluded(block)) left_.push_back(block);
-      }
+      if (rows * in_row <= kMostKept)
+        for (const std::int64_t bound : bounds) coarsest_.push_back(static_cast<std::int32_t>(bound));
+    }
+    int x = -reach_cells_;
+    for (const std::int64_t bound : bounds) {
+      Block block{turn, x, y, level, {}};
+      x += side;
+      if (bound <= best_.bound()) continue;
+      block.sums = LikelihoodPyramid::MostOf(pattern);
+      block.sums.front() = static_cast<std::int32_t>(bound);
+      if (!Excluded(block)) left_.push_back(block);
     }
   }
   // Of equal ones the first is the next.
   std::ranges::reverse(left_);
   std::ranges::stable_sort(left_, {}, &Block::bound);
+  return true;
 }
 
 // Puts those of the four quarters of the block that may hold a better pose before all that are left.

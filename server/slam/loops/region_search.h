@@ -132,7 +132,7 @@ class PoseSearch {
   [[nodiscard]] const Pattern& PatternOf(const Block& block) const {
     return turned_[static_cast<std::size_t>(block.turn)];
   }
-  void LookAtAll();
+  [[nodiscard]] bool LookOnAtCoarsest(int end);
   void Divide(const Block& block);
 
   const LikelihoodPyramid* pyramid_;
@@ -142,11 +142,14 @@ class PoseSearch {
   int reach_cells_ = 0;
   double full_ = 0.0;            // The sum over the points if all lie on a surface.
   std::vector<Pattern> turned_;  // The cells of the points at each heading.
+  // The bounds of blocks of the coarsest level, as far as they are known: a second search begins with the same ones.
+  std::vector<std::int32_t> coarsest_;
 
   std::vector<Exclusion> exclusions_;
   bool any_ = false;
-  bool looked_at_all_ = false;
-  std::vector<Block> left_;  // Those that may hold a better pose; the next one comes last.
+  bool looked_at_coarsest_ = false;
+  std::size_t next_row_ = 0;  // The row of blocks of the coarsest level that is looked at next.
+  std::vector<Block> left_;   // Those that may hold a better pose; the next one comes last.
   Block best_;
   bool found_ = false;
   int scored_ = 0;

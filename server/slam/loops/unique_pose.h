@@ -36,6 +36,8 @@ class UniquePoseSearch {
   void LookFirstIn(const SearchWindow& likely);
   // Goes on until about so many blocks more are evaluated. Returns whether the search has ended.
   bool GoOn(int blocks);
+  // Whether it has ended.
+  [[nodiscard]] bool complete() const { return step_ == Step::kEnded; }
   // Of a search that has ended.
   [[nodiscard]] const std::optional<Pose2>& found() const { return found_; }
 

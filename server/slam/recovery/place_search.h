@@ -71,9 +71,10 @@ class PlaceSearch {
   void Begin(const SearchedMap& map, std::span<const RecentScan> recent, const std::optional<Pose2>& T_map_believed);
   // Whether a search has begun, and nothing has ended it.
   [[nodiscard]] bool searching() const { return search_.has_value(); }
-  // Goes on until about so many blocks more are evaluated (PoseSearch). Returns whether nothing is left to search.
-  // REQUIRES: searching.
-  [[nodiscard]] bool GoOn(int blocks) { return search_->poses.GoOn(blocks); }
+  // Goes on until about so many blocks more are evaluated (PoseSearch). REQUIRES: searching.
+  void GoOn(int blocks) { search_->poses.GoOn(blocks); }
+  // Whether nothing is left to search. REQUIRES: searching.
+  [[nodiscard]] bool complete() const { return search_->poses.complete(); }
   // Ends a search of which nothing is left. Returns the place of the last of `recent`, which go on from those at Begin.
   [[nodiscard]] std::optional<FoundPlace> End(const SearchedMap& map, std::span<const RecentScan> recent);
   void Stop() { search_.reset(); }

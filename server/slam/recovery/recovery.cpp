@@ -29,7 +29,7 @@ constexpr double kEverywhereEveryM = 4.0;
 // Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
 // its path is waited for by nobody. One that is lost, or may have been carried, is to be found soon.
 constexpr int kBlocksOnPath = 60'000;
-constexpr int kBlocksLost = 200'000;
+constexpr int kBlocksLost = 100'000;
 
 }  // namespace
 
@@ -187,7 +187,12 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
 std::optional<FoundPlace> Recovery::SearchOn(const SearchedMap& map) {
   const double travelled_m = recent_.back().travelled_m;
   if (search_.searching()) {
-    if (!search_.GoOn(BlocksPerScan())) return std::nullopt;
+    // What it has found is looked at with the next scan: that takes as long as a part of the search, and if the robot
+    // is on its path, all keyframes since then are added to it.
+    if (!search_.complete()) {
+      search_.GoOn(BlocksPerScan());
+      return std::nullopt;
+    }
     auto place = search_.End(map, recent_);
     if (doubt_) doubt_->searched = true;
     if (place && IsConfirmed(place->T_map_robot, searched_at_m_)) return place;
@@ -217,8 +222,13 @@ void Recovery::SearchAgain(const SearchedMap& map) {
   const auto last = std::ranges::find(recent_, searched_at_m_, &RecentScan::travelled_m);
   if (last == recent_.end()) return;
   BeginSearch(map, {recent_.begin(), last + 1});
-  for (auto scan = last + 1; scan != recent_.end() && search_.searching(); ++scan)
-    if (search_.GoOn(BlocksPerScan())) search_.Stop();
+  for (auto scan = last + 1; scan != recent_.end() && search_.searching(); ++scan) {
+    if (search_.complete()) {
+      search_.Stop();
+    } else {
+      search_.GoOn(BlocksPerScan());
+    }
+  }
 }
 
 bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const {

@@ -9,6 +9,7 @@
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
+#include "server/slam/loops/region.h"
 #include "server/slam/loops/region_search.h"
 #include "server/slam/loops/visibility.h"
 #include "server/slam/matching/point_index.h"

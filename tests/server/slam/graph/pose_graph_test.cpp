@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <random>
 
+#include "server/slam/graph/block_cholesky.h"
 #include "server/slam/graph/loop_graph.h"
 #include "tests/numerical_derivative.h"
 
@@ -141,6 +143,81 @@ TEST(LoopGraph, IsTheSameFitAsThatOfAllNodes) {
     EXPECT_LT(std::abs(apart.theta), 0.002) << k;
   }
   EXPECT_EQ(ends.front(), square.measured.front());
+}
+
+// A wrong loop reaches far at first, and the fit must let go of it as that of all nodes does.
+TEST(LoopGraph, OutvotesAWrongLoopAsTheFitOfAllNodesDoes) {
+  Square square;
+  for (const std::size_t k : {36U, 37U, 38U, 39U, 40U})
+    square.relations.push_back({40 - k, k, Between(square.truth[40 - k], square.truth[k]), kLoopCovariance, true});
+  square.relations.push_back({5, 25, {0.0, 0.0, 0.0}, kLoopCovariance, true});
+  std::vector<Pose2> all = square.measured, ends = square.measured;
+  const PoseGraphSummary of_all = OptimisePoses(all, square.relations, {});
+  const PoseGraphSummary of_ends = OptimiseLoopGraph(ends, square.relations, {});
+  ASSERT_TRUE(of_all.usable && of_ends.usable);
+  EXPECT_NEAR(of_ends.cost_after, of_all.cost_after, 0.01 * of_all.cost_after);
+  for (std::size_t k = 0; k < all.size(); ++k) EXPECT_LT(Between(all[k], ends[k]).translation().norm(), 0.02) << k;
+}
+
+// The result is that of a dense solution, whatever the order of elimination and wherever blocks appear in between.
+TEST(BlockCholesky, SolvesAsADenseMatrixDoes) {
+  constexpr std::size_t kNodes = 25;
+  std::mt19937_64 rng(3);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  std::uniform_int_distribution<std::uint32_t> node(0, kNodes - 1);
+  std::vector<BlockCholesky::Edge> edges;
+  for (std::uint32_t k = 1; k < kNodes; ++k) edges.push_back({k - 1, k});
+  for (int i = 0; i < 20; ++i)
+    if (const BlockCholesky::Edge edge{node(rng), node(rng)}; edge.a != edge.b) edges.push_back(edge);
+  edges.push_back({edges.back().b, edges.back().a});  // The same block from the other side.
+  BlockCholesky sparse(kNodes, edges);
+  for (int round = 0; round < 2; ++round) {  // With other numbers at the same places.
+    Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(3 * kNodes, 3 * kNodes);
+    sparse.SetZero();
+    const auto random = [&] { return Eigen::Matrix3d::NullaryExpr([&] { return any(rng); }).eval(); };
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      const Eigen::Matrix3d J_a = random(), J_b = random() + 3.0 * Eigen::Matrix3d::Identity();
+      const auto a = 3 * static_cast<Eigen::Index>(edges[i].a), b = 3 * static_cast<Eigen::Index>(edges[i].b);
+      sparse.AddToDiagonal(edges[i].a, J_a.transpose() * J_a);
+      sparse.AddToDiagonal(edges[i].b, J_b.transpose() * J_b);
+      sparse.AddToEdge(i, J_a.transpose() * J_b);
+      dense.block<3, 3>(a, a) += J_a.transpose() * J_a;
+      dense.block<3, 3>(b, b) += J_b.transpose() * J_b;
+      dense.block<3, 3>(a, b) += J_a.transpose() * J_b;
+      dense.block<3, 3>(b, a) += J_b.transpose() * J_a;
+    }
+    sparse.AddToDiagonal(0, Eigen::Matrix3d::Identity());
+    dense.topLeftCorner<3, 3>() += Eigen::Matrix3d::Identity();
+    std::vector<Eigen::Vector3d> x(kNodes);
+    Eigen::VectorXd b(3 * kNodes);
+    for (std::size_t k = 0; k < kNodes; ++k) {
+      x[k] = Eigen::Vector3d::NullaryExpr([&] { return any(rng); });
+      b.segment<3>(3 * static_cast<Eigen::Index>(k)) = x[k];
+    }
+    ASSERT_TRUE(sparse.Factorise());
+    sparse.Solve(x);
+    const Eigen::VectorXd expected = dense.ldlt().solve(b);
+    for (std::size_t k = 0; k < kNodes; ++k)
+      EXPECT_LT((x[k] - expected.segment<3>(3 * static_cast<Eigen::Index>(k))).norm(), 1e-8) << k;
+  }
+}
+
+TEST(BlockCholesky, SaysThatAMatrixIsNotPositiveDefinite) {
+  const std::vector<BlockCholesky::Edge> edges = {{0, 1}};
+  BlockCholesky matrix(2, edges);
+  matrix.AddToDiagonal(0, Eigen::Matrix3d::Identity());
+  matrix.AddToDiagonal(1, Eigen::Matrix3d::Identity());
+  matrix.AddToEdge(0, 2.0 * Eigen::Matrix3d::Identity());
+  EXPECT_FALSE(matrix.Factorise());
+}
+
+// A long chain with few loops must stay nearly as sparse as it is: otherwise a large loop takes seconds.
+TEST(BlockCholesky, FillsInLittle) {
+  constexpr std::uint32_t kNodes = 3000;
+  std::vector<BlockCholesky::Edge> edges;
+  for (std::uint32_t k = 1; k < kNodes; ++k) edges.push_back({k - 1, k});
+  for (std::uint32_t k = 0; k + 1500 < kNodes; k += 5) edges.push_back({k, k + 1500});
+  EXPECT_LT(BlockCholesky(kNodes, edges).factor_blocks(), 3 * edges.size());
 }
 
 TEST(LoopGraph, LeavesAPathThatCannotBeFitted) {

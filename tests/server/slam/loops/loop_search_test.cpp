@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "server/slam/state/archive.h"
 #include "tests/server/slam/ring_world.h"
 
 namespace cairn::slam {
@@ -153,6 +159,74 @@ TEST(LoopSearch, TheSameScansDoNotConfirmALoop) {
       if (found) ExpectRight(drive, *found);
     }
   }
+}
+
+// A search is done in parts, one with each keyframe. A restart between any two of them changes nothing.
+TEST(LoopSearch, GoesOnAfterARestart) {
+  const World world = RingCorridor(true, 11);
+  LoopSearch search({}, {});
+  Drive drive;
+  std::mt19937_64 rng(1);
+  std::vector<std::string> states;  // After each keyframe.
+  std::optional<LoopClosure> found;
+  double way_m = 0.0;
+  for (const Pose2& step : RingSteps(150.0, 0.4)) {
+    drive.Step(world, step, 0.0015 * step.x, rng);
+    way_m += step.x;
+    if (way_m > 112.0) {
+      // What a part finds is kept, and the part that gives the loop is another one than that which confirms it.
+      LoopSearch restored({}, {});
+      if (!states.empty()) {
+        StateReader reader(states.back());
+        reader.SetKeyframes(drive.trail.size() - 1);
+        reader(restored);
+        ASSERT_TRUE(reader.done());
+      }
+      const auto again = restored.Find(drive.trail, drive.believed);
+      found = search.Find(drive.trail, drive.believed);
+      ASSERT_EQ(again.has_value(), found.has_value()) << drive.trail.size();
+      if (found) {
+        EXPECT_EQ(again->T_old_recent, found->T_old_recent);
+        EXPECT_EQ(again->old, found->old);
+        EXPECT_EQ(found->recent, drive.trail.size() - 1);
+        break;
+      }
+      StateWriter writer;
+      writer(search);
+      states.push_back(writer.Bytes());
+    }
+  }
+  ASSERT_TRUE(found);
+  ExpectRight(drive, *found);
+}
+
+TEST(LoopSearch, WhatWasFoundBeforeTheRobotWasLostClosesNoLoop) {
+  const World world = RingCorridor(true, 11);
+  LoopSearch search({}, {});
+  Drive drive;
+  std::mt19937_64 rng(1);
+  double way_m = 0.0, found_at_m = 0.0;
+  for (const Pose2& step : RingSteps(150.0, 0.4)) {
+    drive.Step(world, step, 0.0015 * step.x, rng);
+    way_m += step.x;
+    if (way_m < 112.0) continue;
+    search.ForgetUnconfirmed();  // Again and again.
+    if (search.Find(drive.trail, drive.believed)) found_at_m = way_m;
+  }
+  EXPECT_EQ(found_at_m, 0.0);
+}
+
+TEST(OnePerCell, TakesTheFirstPointOfEachCell) {
+  OnePerCell cells(0.1);
+  std::set<std::pair<std::int64_t, std::int64_t>> taken;
+  std::mt19937_64 rng(2);
+  std::uniform_real_distribution<double> any(-4.0, 4.0);
+  for (int i = 0; i < 5000; ++i) {
+    const Eigen::Vector2d p(any(rng), any(rng));
+    const auto number = [](double v) { return static_cast<std::int64_t>(std::floor(v / 0.1)); };
+    ASSERT_EQ(cells.Takes(p), taken.emplace(number(p.x()), number(p.y())).second) << i;
+  }
+  EXPECT_GT(taken.size(), 2000U) << "more than its memory held at first";
 }
 
 TEST(LoopSearch, CanBeSwitchedOff) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -157,13 +158,18 @@ TEST(RegionSearch, InPartsItFindsTheSame) {
   const SearchWindow window{{}, 4.0, 0.4};
   const auto at_once = FindBestPose(points, pyramid, window, 0.3);
   PoseSearch search(points, pyramid, window);
-  search.Begin(0.3);
-  int parts = 1;
-  for (; !search.GoOn(200); ++parts) ASSERT_LT(parts, 1000);
-  EXPECT_GT(parts, 3);
-  ASSERT_TRUE(at_once && search.peak());
-  EXPECT_EQ(search.peak()->T_ref_curr, at_once->T_ref_curr);
-  EXPECT_EQ(search.peak()->score, at_once->score);
+  std::optional<int> parts;
+  for (int time = 0; time < 2; ++time) {  // The second time the bounds of the coarsest blocks are known.
+    search.Begin(0.3);
+    int count = 1;
+    for (; !search.GoOn(200); ++count) ASSERT_LT(count, 1000);
+    EXPECT_GT(count, 10) << "the blocks of the coarsest level, of which there are 2,340, are looked at in parts, too";
+    EXPECT_EQ(parts.value_or(count), count);
+    parts = count;
+    ASSERT_TRUE(at_once && search.peak());
+    EXPECT_EQ(search.peak()->T_ref_curr, at_once->T_ref_curr);
+    EXPECT_EQ(search.peak()->score, at_once->score);
+  }
 }
 
 TEST(RegionSearch, AnyPoseIsFoundSoonerThanTheBest) {

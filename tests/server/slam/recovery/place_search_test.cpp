@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "server/slam/mapper_options.h"
@@ -233,6 +234,38 @@ TEST_F(Lost, IsFoundByTwoSearchesThatAgreeWithSomeWayBetweenThem) {
   }
   ASSERT_TRUE(found_m);
   EXPECT_GE(*found_m, LoopOptions{}.confirm_after_m);
+}
+
+// A search is done in parts, and what it has found is looked at with the scan after its last part. A restart between
+// any two scans changes nothing.
+TEST_F(Lost, IsFoundWithTheSameScanAfterARestart) {
+  Recovery recovery = Make();
+  recovery.Begin(KnownAt(30), false);
+  std::optional<Recovery::Found> found, again;
+  int searching = 0;  // Restarts during a search.
+  for (double way_m = 0.0; way_m < 15.0 && !found; way_m += 0.25) {
+    StateWriter writer;
+    writer(recovery);
+    const std::string bytes = writer.Bytes();
+    StateReader reader(bytes);
+    Recovery restored = Make();
+    reader(restored);
+    ASSERT_TRUE(reader.done());
+    const RecentScan scan = ScanAt(world_, {8.0 + way_m, 0, 0}, T_track_world_, 0.0, rng_);
+    TrackStep step;
+    step.T_track_robot = scan.T_track_robot;
+    step.matched = true;
+    const auto take = [&](Recovery& by) {
+      return by.Take({scan.scan, KnownAt(0).T_odom_robot}, step, scan.points, MapOfHall().searched);
+    };
+    again = take(restored);
+    found = take(recovery);
+    ASSERT_EQ(again.has_value(), found.has_value()) << way_m;
+    searching += recovery.Unconfirmed().empty() ? 1 : 0;
+  }
+  ASSERT_TRUE(found);
+  EXPECT_GE(searching, 2);
+  EXPECT_EQ(again->place.T_map_robot, found->place.T_map_robot);
 }
 
 TEST_F(Lost, WhereItIsSaidToBeOneSearchIsEnough) {
