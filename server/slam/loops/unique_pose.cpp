@@ -47,7 +47,7 @@ void UniquePoseSearch::LookFirstIn(const SearchWindow& likely) {
 
 void UniquePoseSearch::LookForRivals(const RegionPeak& of, Step step) {
   best_ = of.T_ref_curr;
-  const Exclusion own = ApartFrom(best_);
+  const Exclusion own = ApartFrom(of.T_ref_curr);
   search_.Begin(max_rival_ * of.score, std::span(&own, 1), true);
   step_ = step;
 }
@@ -58,6 +58,7 @@ bool UniquePoseSearch::GoOn(int blocks) {
   const auto peak = search_.peak();
   if (step_ == Step::kRivalOfLikely && peak) {  // The best pose may be another one.
     search_.Begin(kMinLikelihood);
+    best_.reset();
     step_ = Step::kBest;
     return false;
   }

@@ -40,6 +40,9 @@ class UniquePoseSearch {
   [[nodiscard]] bool complete() const { return step_ == Step::kEnded; }
   // Of a search that has ended.
   [[nodiscard]] const std::optional<Pose2>& found() const { return found_; }
+  // Of a search that has ended: the pose that fits best, also if it has rivals. No value if none fits, or if the search
+  // had to be given up before it was known.
+  [[nodiscard]] const std::optional<Pose2>& best() const { return best_; }
 
  private:
   enum class Step : std::uint8_t { kBest, kRivalOfLikely, kRival, kEnded };
@@ -50,7 +53,7 @@ class UniquePoseSearch {
   double max_rival_;
   PoseSearch search_;
   Step step_ = Step::kBest;
-  Pose2 best_;
+  std::optional<Pose2> best_;
   std::optional<Pose2> found_;
 };
 

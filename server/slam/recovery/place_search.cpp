@@ -68,12 +68,13 @@ void PlaceSearch::Begin(const SearchedMap& map, std::span<const RecentScan> rece
   if (T_map_believed) search_->poses.LookFirstIn({*T_map_believed, options_.near_m, options_.near_rad});
 }
 
-std::optional<FoundPlace> PlaceSearch::End(const SearchedMap& map, std::span<const RecentScan> recent) {
+PlaceSearch::Ended PlaceSearch::End(const SearchedMap& map, std::span<const RecentScan> recent) {
   const Search search = *std::exchange(search_, std::nullopt);
-  if (!search.poses.found()) return std::nullopt;
-  const Pose2 T_map_robot = *search.poses.found() * Between(search.T_track_robot, recent.back().T_track_robot);
-  return Fit(map, recent, SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM), T_map_robot,
-             UniquePoseCovariance());
+  if (!search.poses.best()) return {};
+  const Pose2 T_map_robot = *search.poses.best() * Between(search.T_track_robot, recent.back().T_track_robot);
+  const auto best =
+      Fit(map, recent, SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM), T_map_robot, UniquePoseCovariance());
+  return {search.poses.found() ? best : std::nullopt, best};
 }
 
 RankedPlaces PlaceSearch::Rank(const SearchedMap& map, std::span<const RecentScan> recent, std::size_t most,

@@ -75,8 +75,12 @@ class PlaceSearch {
   void GoOn(int blocks) { search_->poses.GoOn(blocks); }
   // Whether nothing is left to search. REQUIRES: searching.
   [[nodiscard]] bool complete() const { return search_->poses.complete(); }
+  struct Ended {
+    std::optional<FoundPlace> found;  // As Find.
+    std::optional<FoundPlace> best;   // Where the scans fit best, if nothing contradicts it there; it may have rivals.
+  };
   // Ends a search of which nothing is left. Returns the place of the last of `recent`, which go on from those at Begin.
-  [[nodiscard]] std::optional<FoundPlace> End(const SearchedMap& map, std::span<const RecentScan> recent);
+  [[nodiscard]] Ended End(const SearchedMap& map, std::span<const RecentScan> recent);
   void Stop() { search_.reset(); }
   // The same, in the part of the map around a pose where the last of the scans is believed to be: within
   // PlaceSearchOptions::near_m and near_rad, or farther.

@@ -193,8 +193,12 @@ std::optional<FoundPlace> Recovery::SearchOn(const SearchedMap& map) {
       search_.GoOn(BlocksPerScan());
       return std::nullopt;
     }
-    auto place = search_.End(map, recent_);
-    if (doubt_) doubt_->searched = true;
+    const PlaceSearch::Ended ended = search_.End(map, recent_);
+    if (doubt_) {
+      const Pose2 T_map_believed = *T_map_track_ * recent_.back().T_track_robot;
+      doubt_->fits_nowhere_else = !ended.best || IsNear(T_map_believed, ended.best->T_map_robot);
+    }
+    const auto& place = ended.found;
     if (place && IsConfirmed(place->T_map_robot, searched_at_m_)) return place;
   }
   const bool followed = said_ && T_map_track_.has_value();
