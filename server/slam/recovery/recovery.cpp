@@ -195,8 +195,9 @@ std::optional<FoundPlace> Recovery::SearchOn(const SearchedMap& map) {
     }
     const PlaceSearch::Ended ended = search_.End(map, recent_);
     if (doubt_) {
+      doubt_->searched = true;
       const Pose2 T_map_believed = *T_map_track_ * recent_.back().T_track_robot;
-      doubt_->fits_nowhere_else = !ended.best || IsNear(T_map_believed, ended.best->T_map_robot);
+      if (ended.best && !IsNear(T_map_believed, ended.best->T_map_robot)) doubt_->likely = true;
     }
     const auto& place = ended.found;
     if (place && IsConfirmed(place->T_map_robot, searched_at_m_)) return place;

@@ -10,7 +10,7 @@
 //    the place as well, it is no place relative to what the robot has seen before (`Found::elsewhere`).
 //  - A robot that may have been carried between two scans (carried.h) is first held on its path as well, if its scans
 //    match. It is looked for if within kMostDoubtedM of way they have not shown that nobody has carried it, and at once
-//    where a scan does not match. It goes on along its path if that was not likely and its map shows it nowhere else.
+//    where a scan does not match. It goes on along its path if that was not likely and it is found nowhere else.
 //  - The whole map is searched in parts, one with each scan taken, so that no scan takes long. Which parts are done
 //    follows from the scans since it began, so that a restarted server goes on in the same way.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
@@ -118,17 +118,17 @@ class Recovery {
   // A robot on its path may have been carried since the last scan.
   struct Doubt {
     SceneAgreement before;  // Of the last scan with the last keyframes.
-    bool likely = false;    // Most of the scan after it was not explained.
-    // The whole map has been searched for the robot since then, and by the last search the place that fits best is on
-    // its path, or no place fits.
-    bool fits_nowhere_else = false;
+    // Most of the scan after it was not explained, or since then its map has shown it elsewhere: at the place where its
+    // scans fit best nothing contradicted them, whether or not it has rivals, as in a corridor of equal rooms.
+    bool likely = false;
+    bool searched = false;  // The whole map has been searched for the robot since then.
 
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
       archive(self.before, self.likely);
-      bool has_fits_nowhere_else = true;
-      if constexpr (Archive::kReads) has_fits_nowhere_else = archive.format() >= 14;
-      if (has_fits_nowhere_else) archive(self.fits_nowhere_else);
+      bool has_searched = true;
+      if constexpr (Archive::kReads) has_searched = archive.format() >= 14;
+      if (has_searched) archive(self.searched);
     }
   };
   // REQUIRES: on_path.
@@ -138,12 +138,10 @@ class Recovery {
   [[nodiscard]] const std::optional<Doubt>& doubt() const { return doubt_; }
   // Whether it has been doubted for so long that it counts as carried.
   [[nodiscard]] bool was_carried() const { return doubt_ && has_scans() && recent_.back().travelled_m > kMostDoubtedM; }
-  // Whether it was not likely, and its map shows it nowhere else after so much way: then something else must have
-  // changed. A door was closed, or furniture was moved. A place elsewhere at which all fits speaks against it even if
-  // it is not the only one, as in a corridor of equal rooms.
+  // Whether it was not likely, and has been found nowhere else on so much way that something else must have changed: a
+  // door was closed, or furniture was moved.
   [[nodiscard]] bool doubted_in_vain() const {
-    return doubt_ && !doubt_->likely && doubt_->fits_nowhere_else && has_scans() &&
-           recent_.back().travelled_m > kDoubtedInVainM;
+    return doubt_ && !doubt_->likely && doubt_->searched && has_scans() && recent_.back().travelled_m > kDoubtedInVainM;
   }
   // Where the robot may be now: at the places found that are not confirmed.
   [[nodiscard]] std::vector<Pose2> Unconfirmed() const;
