@@ -160,7 +160,8 @@ void OdometryPairing::PairWithoutOdometry() {
     std::vector<Odometry> stands;
     if (const std::uint64_t duration_ns = DurationNs(*scan); duration_ns > 0) {
       const auto end = static_cast<Stamp>(static_cast<std::uint64_t>(scan->stamp) + duration_ns);
-      stands = {{.stamp = scan->stamp}, {.stamp = end}};
+      stands = {{.sequence = 0, .stamp = scan->stamp, .T_odom_robot = {}},
+                {.sequence = 0, .stamp = end, .T_odom_robot = {}}};
     }
     Hand(scan, std::move(stands), {}, {}, false);
   }
