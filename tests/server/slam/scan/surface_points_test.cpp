@@ -68,8 +68,9 @@ TEST(SurfacePoints, AreSpacedAndLeaveNothingOut) {
     const double apart_m = (points[i].p - points[i - 1].p).norm();
     EXPECT_LT(apart_m, 2.5 * options.min_spacing_m) << points[i].p.transpose();
     // In corners two surfaces end, and a few hits are left over.
-    if (points[i].smooth() && points[i].normal.dot(points[i - 1].normal) > 0.999)
+    if (points[i].smooth() && points[i].normal.dot(points[i - 1].normal) > 0.999) {
       EXPECT_GT(apart_m, 0.5 * options.min_spacing_m) << points[i].p.transpose();
+    }
   }
 }
 
