@@ -13,6 +13,8 @@ namespace {
 constexpr std::size_t kMaxPoints = 2048;
 constexpr std::size_t kMaxNeighbours = 512;  // Neighbours on either side of a point.
 
+constexpr double kMostOfOnePoint = 64.0;  // Hits.
+
 // Largest distance between the hits of two neighbouring beams on one surface: so many distances between neighbouring
 // beams at that range, within two bounds. Half or twice of these changes the errors no more than another seed (study
 // `sensitivity`).
@@ -48,12 +50,28 @@ std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& 
   return {first, last};
 }
 
+Eigen::Vector2d MeanOf(const std::vector<BeamPoint>& hits, std::size_t begin, std::size_t end) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (std::size_t i = begin; i < end; ++i) sum += hits[i].p_robot;
+  return sum / static_cast<double>(end - begin);
+}
+
+// The number of consecutive hits that one point stands for, so that points have at least this spacing. It follows from
+// the mean distance between the hits around, and not from the hits themselves: to take the next hit that is far enough
+// from the last one prefers hits whose noise leads away from it, which moves walls that recede from the sensor outwards
+// and others inwards.
+std::size_t HitsOfOnePoint(const std::vector<BeamPoint>& hits, std::pair<std::size_t, std::size_t> around,
+                           double spacing_m) {
+  const auto [first, last] = around;
+  if (first == last) return 1;
+  const double each_m = (hits[last].p_robot - hits[first].p_robot).norm() / static_cast<double>(last - first);
+  return spacing_m <= each_m ? 1 : static_cast<std::size_t>(std::ceil(std::min(spacing_m / each_m, kMostOfOnePoint)));
+}
+
 Eigen::Vector2d NormalOf(const std::vector<BeamPoint>& hits, std::size_t first, std::size_t last,
                          const Eigen::Vector2d& p_sensor, double max_flatness) {
   if (last - first + 1 < 3) return Eigen::Vector2d::Zero();
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (std::size_t i = first; i <= last; ++i) mean += hits[i].p_robot;
-  mean /= static_cast<double>(last - first + 1);
+  const Eigen::Vector2d mean = MeanOf(hits, first, last + 1);
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (std::size_t i = first; i <= last; ++i) {
     const Eigen::Vector2d d = hits[i].p_robot - mean;
@@ -131,12 +149,16 @@ std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, con
   std::vector<SurfacePoint> surface;
   const std::size_t stride = hits.size() / kMaxPoints + 1;
   surface.reserve(hits.size() / stride + 1);
-  for (std::size_t i = 0; i < hits.size(); i += stride) {
-    if (!surface.empty() && (hits[i].p_robot - surface.back().p).norm() < options.min_spacing_m) continue;
-    const auto [first, last] = Neighbourhood(hits, i, step, options);
-    Eigen::Vector2d normal = NormalOf(hits, first, last, p_sensor, options.max_flatness);
-    if (normal.isZero()) normal = GrazingNormalOf(hits, i, p_sensor, options);
-    surface.push_back({hits[i].p_robot, normal});
+  for (std::size_t begin = 0, next = 0; begin < hits.size(); begin = next) {
+    auto around = Neighbourhood(hits, begin, step, options);
+    const std::size_t end = std::min(begin + HitsOfOnePoint(hits, around, options.min_spacing_m), around.second + 1);
+    next = std::max(end, begin + stride);
+    const std::size_t middle = (begin + end - 1) / 2;
+    if (middle != begin) around = Neighbourhood(hits, middle, step, options);
+    Eigen::Vector2d normal = NormalOf(hits, around.first, around.second, p_sensor, options.max_flatness);
+    if (normal.isZero()) normal = GrazingNormalOf(hits, middle, p_sensor, options);
+    // Hits on a rough surface are not averaged, because the mean of a corner or of two surfaces lies on neither.
+    surface.push_back({normal.isZero() ? hits[middle].p_robot : MeanOf(hits, begin, end), normal});
   }
   return surface;
 }
