@@ -1,26 +1,29 @@
-// Takes the first point of each cell of a raster. Not thread-safe.
+// Takes the first point of each cell of a raster. Memory is that of the points taken, not of the area. Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
-#include <unordered_set>
+#include <vector>
 
 namespace cairn::slam {
 
 class OnePerCell {
  public:
   explicit OnePerCell(double cell_m) : cell_m_(cell_m) {}
-
-  bool Takes(const Eigen::Vector2d& p) {
-    const auto x = static_cast<std::int64_t>(std::floor(p.x() / cell_m_));
-    const auto y = static_cast<std::int64_t>(std::floor(p.y() / cell_m_));
-    return taken_.insert((x << 32) ^ (y & 0xffffffff)).second;
-  }
+  [[nodiscard]] bool Takes(const Eigen::Vector2d& p);
 
  private:
+  // Where a cell is, or would be put.
+  [[nodiscard]] std::size_t SlotOf(std::uint64_t cell) const;
+  void Grow();
+
+  // Of cells beyond all coordinates that occur.
+  static constexpr std::uint64_t kNone = 0x80000000'80000000;
+
   double cell_m_;
-  std::unordered_set<std::int64_t> taken_;
+  std::vector<std::uint64_t> taken_ = std::vector<std::uint64_t>(1024, kNone);  // A table with open addressing.
+  std::size_t count_ = 0;
 };
 
 }  // namespace cairn::slam

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "server/slam/loops/one_per_cell.h"
 #include "server/slam/state/archive.h"
 #include "tests/server/slam/ring_world.h"
 
