@@ -269,15 +269,15 @@ Agreement Compare(const std::vector<slam::MapperSnapshot>& before, const Robots&
     std::vector<SeenFrom> along, old, last;
     for (std::size_t k = 0; k < now.keyframes.size(); k += kCompareEvery) {
       if (!now.keyframes[k].localized) continue;
-      along.push_back({now.keyframes[k].scan.get(), now.full_path[k]});
-      if (k < before[i].full_path.size()) old.push_back({now.keyframes[k].scan.get(), before[i].full_path[k]});
+      along.push_back({now.keyframes[k].scan.Share(), now.full_path[k]});
+      if (k < before[i].full_path.size()) old.push_back({now.keyframes[k].scan.Share(), before[i].full_path[k]});
     }
     // The last pose belongs to a scan that need not be a keyframe: that of the last keyframe is as far beside it as the
     // path says.
     const Trajectory poses = now.FullTrajectory();
     if (!poses.empty() && !now.keyframes.empty() && poses.back().stamp == pose.stamp) {
       const Pose2 T_last_keyframe = Between(poses.back().T_map_robot, now.full_path.back());
-      last.push_back({now.keyframes.back().scan.get(), pose.T_map_robot * T_last_keyframe});
+      last.push_back({now.keyframes.back().scan.Share(), pose.T_map_robot * T_last_keyframe});
     }
     agreement.path_m = std::max(agreement.path_m, LargestMove(map, along, kMostMoveM));
     agreement.old_path_m = std::max(agreement.old_path_m, LargestMove(map, old, kMostMoveM));

@@ -2,6 +2,7 @@
 // that the walls they see lie on the walls that the tiles show. Frame: map; metres. Stateless, deterministic.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace cairn::studies {
 
 // The largest of these over scans at these poses, one for each.
 struct SeenFrom {
-  const Scan* scan = nullptr;
+  std::shared_ptr<const Scan> scan;
   Pose2 T_map_robot;
 };
 [[nodiscard]] double LargestMove(const OccupancyImage& map, std::span<const SeenFrom> scans, double most_m);
