@@ -53,7 +53,7 @@ struct FrontEndOptions {
   MotionNoise odometry{0.05, 0.8, 0.0, 0.04, 0.4, 1.2};
   bool use_odometry = true;  // False: no odometry, as in thesis C 4.4.
   NoOdometryOptions no_odometry;
-  std::int64_t reference_keyframes = 40;
+  std::int64_t reference_keyframes = 80;
   double retry_below = 0.65;
   RetryOptions retry;
   double keep_above = 0.75;     // See ScanMatcher::keeps_reference.

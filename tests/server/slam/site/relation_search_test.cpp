@@ -13,12 +13,12 @@ using test::ErrorOfRelation;
 using test::RingSession;
 using test::TestSession;
 
-const GoOn kGoesOn = [] { return true; };
+const GoOn kSearchesOn = [] { return true; };
 
 struct SearchBetweenTwo : ::testing::Test {
   // Both stand at the same place at keyframe 40 of the first, and 0 of the second.
   [[nodiscard]] std::vector<SessionRelation> Nearby(const std::vector<Tie>& ties = {{25, 0}},
-                                                    const GoOn& go_on = kGoesOn) {
+                                                    const GoOn& go_on = kSearchesOn) {
     return FindRelationsNearby(known.placed(), seen.placed(), ties, options, go_on, book);
   }
 
@@ -58,7 +58,7 @@ TEST_F(SearchBetweenTwo, LeavesOutKeyframesThatAreNotLocalized) {
   for (Keyframe& keyframe : seen.drive.snapshot.keyframes) keyframe.localized = false;
   const TestSession lost(1, seen.drive);
   const std::vector<Tie> ties{{25, 0}};
-  EXPECT_TRUE(FindRelationsNearby(known.placed(), lost.placed(), ties, options, kGoesOn, book).empty());
+  EXPECT_TRUE(FindRelationsNearby(known.placed(), lost.placed(), ties, options, kSearchesOn, book).empty());
   EXPECT_TRUE(PlacesToLookFor(*lost.map).empty());
 }
 
