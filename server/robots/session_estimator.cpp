@@ -353,7 +353,6 @@ void SessionEstimator::On(Finish&& finish) {
   if (!ended_ && !goes_on) {
     if (finish.final) Store(SessionFinished{true, finish.reason});
     pipeline_.Finish();
-    if (finish.final) FinishMap();
     RefreshLandmarks(true);
     ended_ = finish.final;
     if (ended_) pipeline_.mapper().ForgetSuggestion();

@@ -147,7 +147,6 @@ class SessionEstimator {
   // Returns false if the grid stays as it was, because the path cannot follow.
   bool AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
   void FollowPath(std::optional<bool> fragment);
-  void FinishMap();
   void SetEpoch(std::uint32_t epoch);
   void Drive(const Pose2& T_map_robot);
   void TellJoining();

@@ -65,21 +65,6 @@ bool SessionEstimator::DrawLate() {
   return more;
 }
 
-// No scan will follow: the map is drawn to its end, along the path that fits all that was seen again.
-void SessionEstimator::FinishMap() {
-  slam::Mapper& mapper = pipeline_.mapper();
-  const std::vector<Pose2> before = mapper.BestPath();
-  mapper.FinishMap();
-  const std::vector<Pose2> after = mapper.BestPath();
-  if (after != before && after.size() == before.size() && !before.empty()) {
-    if (!mapper.localises()) record_.MoveLast(after.back() * before.back().Inverse());
-    FollowPath({});
-  }
-  if (replaying_) return;
-  GridChange change = TakeGridChange();
-  if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
-}
-
 // What has been said of the robot's way so far lies where the path lies now, and so where the grid shows it. What a
 // robot did since it is only localised does not hang on its own path.
 void SessionEstimator::FollowPath(std::optional<bool> fragment) {

@@ -117,8 +117,11 @@ TEST_F(Start, IsNotBelievedWhereTheServerDroppedTheFirstScans) {
   constexpr ClientId kThird = 30;
   house_.Open("r3", kThird, "lab", Pose2{40.0, 0.0, 0.0});
   ASSERT_TRUE(house_.WaitPhase("r3", kThird, SessionPhase::kActive));
+  Odometry later = RoomOdometry(30);  // Of the scans before it nothing says how the robot had moved.
+  later.sequence -= 30;
+  house_.SendOdometry("r3", kThird, later);
   for (int step = 0; step < 40; ++step) house_.SendScan("r3", kThird, RoomScan(step));
-  for (int step = 30; step < 44; ++step) {
+  for (int step = 31; step < 44; ++step) {
     Odometry odometry = RoomOdometry(step);
     odometry.sequence -= 30;
     house_.SendOdometry("r3", kThird, odometry);

@@ -55,7 +55,7 @@ class LookForRobotTest : public ::testing::Test {
 
 TEST_F(LookForRobotTest, APlaceWithoutARivalIsFoundAndComesFirst) {
   const World world = slam::test::RingCorridor(true);
-  const RobotDrive drive = DriveRing(world, 30.0, 14.0, {5.0, -3.0, 1.0}, 2);
+  const RobotDrive drive = DriveRing(world, 30.0, 20.0, {5.0, -3.0, 1.0}, 2);
   const auto looked = LookFor(drive, *MapOf(world, 0.0, 70.0));
   ASSERT_TRUE(looked) << looked.error().message;
   ASSERT_TRUE(looked->found) << looked->outcome.message;

@@ -246,6 +246,8 @@ TEST(Mapper, AGridThatComesBackGetsWhatWasMappedMeanwhile) {
   const OccupancyGrid after(mapper.grid().options(), mapper.ShareGrid());
   ASSERT_GT(ShareMissing(after, before), 0.1);
   mapper.AdoptGrid(std::move(before), keyframes);
+  while (mapper.DrawLate()) {
+  }
   EXPECT_LT(ShareMissing(after, mapper.grid()), 0.01);
   // What the grid had is not drawn twice.
   EXPECT_LT(ShareOfCellsThatDiffer(mapper.grid(), after), 0.08);
@@ -256,7 +258,7 @@ TEST(Mapper, AGridThatComesBackGetsWhatWasMappedMeanwhile) {
 // pose reports this with self_check on, from the second round on and not before. If the loop is closed, the
 // robot is localized again.
 TEST(Mapper, SaysSoWhereItDrawsTheMapBesideItself) {
-  const Drive drive = DriveLargeRing(44.0, 1.2);
+  const Drive drive = DriveLargeRing(44.0, 1.8);
   const auto drawn = [](const MapperSnapshot& snapshot) {
     return std::count_if(snapshot.keyframes.begin(), snapshot.keyframes.end(),
                          [](const Keyframe& keyframe) { return keyframe.localized; });
@@ -303,7 +305,7 @@ TEST(Mapper, SaysSoWhereItDrawsTheMapBesideItself) {
 // A loop corrects the path of a robot that has noticed a contradiction. From this scan on it is localized again, and
 // the map that is drawn again has also the keyframes that were left out before.
 TEST(Mapper, AfterALargeLoopTheRobotIsLocalizedAtOnceAndTheWholeMapIsDrawn) {
-  const Drive drive = DriveLargeRing(44.0, 1.2);
+  const Drive drive = DriveLargeRing(44.0, 1.8);
   MapperOptions options;
   options.filter.particles = 50;
   options.self_check.max_conflict = 0.1;

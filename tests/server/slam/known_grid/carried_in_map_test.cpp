@@ -74,7 +74,7 @@ Carried CarryUnseen(double from, double to, const MapperOptions& options) {
     const bool wrong = one.localized && (one.T_map_robot.translation() - p).norm() > 1.0;
     result.noticed = result.noticed || !one.localized;
     result.wrong += wrong ? 1 : 0;
-    result.wrong_later += wrong && way_m > 2.0 ? 1 : 0;
+    result.wrong_later += wrong && way_m > 3.0 ? 1 : 0;
     result.found_again = one.localized && !wrong;
   }
   EXPECT_GT(way_m, 10.0);
