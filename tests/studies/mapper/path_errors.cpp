@@ -13,7 +13,6 @@ namespace {
 using slam::PoseRelation, slam::PoseRelationError, slam::Rng, slam::ThreeNormalDraws;
 
 constexpr int kSolvedAtOnce = 10;  // Samples whose right-hand sides are in memory together.
-constexpr double kAlikeM = 2.0;    // Way on which loops were matched with the same surfaces, as in RevisitSearch.
 
 // A relation as the fit sees it: its Jacobians by both poses, whitened by its covariance and its weight.
 struct WhiteRelation {
@@ -21,7 +20,6 @@ struct WhiteRelation {
   std::size_t to = 0;
   Eigen::Matrix3d J_from;
   Eigen::Matrix3d J_to;
-  std::size_t noise = 0;  // Relations with the same number have the same error.
 };
 
 WhiteRelation Whiten(const PoseRelation& relation, std::span<const Pose2> path) {
@@ -30,35 +28,6 @@ WhiteRelation Whiten(const PoseRelation& relation, std::span<const Pose2> path) 
   const Eigen::Matrix3d W = L.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity());
   const double root_weight = relation.loop ? std::sqrt(slam::LoopWeight((W * at.error).squaredNorm())) : 1.0;
   return {relation.from, relation.to, root_weight * W * at.J_error_from, root_weight * W * at.J_error_to};
-}
-
-// Gives each relation the number of its error. Loops on the same two metres share one: they were matched with the same
-// surfaces, and all of them together show no more than one of them. Returns how many errors there are.
-std::size_t NumberErrors(std::vector<WhiteRelation>& white, std::span<const PoseRelation> relations,
-                         std::span<const Pose2> path) {
-  std::vector<double> way_m(path.size(), 0.0);
-  for (std::size_t k = 1; k < path.size(); ++k)
-    way_m[k] = way_m[k - 1] + (path[k].translation() - path[k - 1].translation()).norm();
-  std::vector<std::size_t> loops;
-  std::size_t errors = 0;
-  for (std::size_t i = 0; i < white.size(); ++i) {
-    if (relations[i].loop) {
-      loops.push_back(i);
-    } else {
-      white[i].noise = errors++;
-    }
-  }
-  const auto last_pose = [&](std::size_t i) { return std::max(white[i].from, white[i].to); };
-  std::ranges::stable_sort(loops, {}, last_pose);
-  double begin_m = -2.0 * kAlikeM;
-  for (const std::size_t i : loops) {
-    if (way_m[last_pose(i)] - begin_m > kAlikeM) {
-      begin_m = way_m[last_pose(i)];
-      ++errors;
-    }
-    white[i].noise = errors - 1;
-  }
-  return errors;
 }
 
 // Pose 0 does not move, so it has no columns.
@@ -97,7 +66,6 @@ std::vector<PoseErrorSamples> SamplePathErrors(std::span<const Pose2> path, std:
   std::vector<WhiteRelation> white;
   white.reserve(relations.size());
   for (const PoseRelation& relation : relations) white.push_back(Whiten(relation, path));
-  std::vector<Eigen::Vector3d> noise(NumberErrors(white, relations, path));
   const Eigen::Index numbers = 3 * static_cast<Eigen::Index>(path.size() - 1);
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(Information(white, numbers));
   if (factor.info() != Eigen::Success) return errors;
@@ -105,11 +73,11 @@ std::vector<PoseErrorSamples> SamplePathErrors(std::span<const Pose2> path, std:
     const int count = std::min(kSolvedAtOnce, samples - begin);
     Eigen::MatrixXd b = Eigen::MatrixXd::Zero(numbers, count);
     for (int j = 0; j < count; ++j) {
-      for (Eigen::Vector3d& one : noise) one = ThreeNormalDraws(rng);
       for (const WhiteRelation& relation : white) {
+        const Eigen::Vector3d noise = ThreeNormalDraws(rng);
         const Eigen::Index from = ColumnOf(relation.from), to = ColumnOf(relation.to);
-        if (from != kNone) b.col(j).segment<3>(from) += relation.J_from.transpose() * noise[relation.noise];
-        if (to != kNone) b.col(j).segment<3>(to) += relation.J_to.transpose() * noise[relation.noise];
+        if (from != kNone) b.col(j).segment<3>(from) += relation.J_from.transpose() * noise;
+        if (to != kNone) b.col(j).segment<3>(to) += relation.J_to.transpose() * noise;
       }
     }
     const Eigen::MatrixXd x = factor.solve(b);

@@ -1,11 +1,10 @@
 // The errors that a path may still have after it was fitted to its relations (pose_graph.h), as samples from their
 // joint distribution. Every sample is the change of the fitted path if the relations had other errors, drawn from their
-// covariances; loops count with the weight that the robust loss gives them, and those on the same two metres of way
-// have the same error, because they were matched with the same surfaces: many of them tell no more than one. Samples of
-// all poses together also tell how uncertain one pose is relative to another one. Node 0 has no error. Poses and errors
-// are in `map`. Stateless, thread-safe, deterministic for a given state of `rng`. Takes about as long as two iterations
-// of the fit, and some milliseconds a sample for thousands of poses. Source: Papandreou and Yuille 2010 (Gaussian
-// sampling by local perturbations).
+// covariances; loops count with the weight that the robust loss gives them. Samples of all poses together also tell
+// how uncertain one pose is relative to another one. Node 0 has no error. Poses and errors are in `map`. Stateless,
+// thread-safe, deterministic for a given state of `rng`. Takes about as long as two iterations of the fit, and some
+// milliseconds a sample for thousands of poses.
+// Source: Papandreou and Yuille 2010 (Gaussian sampling by local perturbations).
 #pragma once
 
 #include <Eigen/Core>

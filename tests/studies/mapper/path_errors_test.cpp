@@ -81,23 +81,6 @@ TEST(PathErrors, OfThePoseThatALoopJoinsAreThoseOfTheLoop) {
   EXPECT_TRUE(errors[0].isZero());
 }
 
-// The robot is as sure where it is after it has seen a place again four times on two metres as after once; what it sees
-// again 8 m earlier tells something new.
-TEST(PathErrors, LoopsOnTheSameTwoMetresTellNoMoreThanOne) {
-  const auto at_the_end = [](std::initializer_list<std::size_t> seen_again) {
-    Rng rng(6);
-    FittedDrive drive(false, rng);
-    const Eigen::Matrix3d covariance = 100.0 * kLoopCovariance;
-    for (const std::size_t k : seen_again)
-      drive.relations.push_back({0, k, Between(drive.path[0], drive.path[k]), covariance, true});
-    const auto errors = SamplePathErrors(drive.path, drive.relations, kSamples, rng);
-    return RelativeCovariance(drive.path[0], errors[0], drive.path[40], errors[40]).topLeftCorner<2, 2>().trace();
-  };
-  const double once = at_the_end({40});
-  EXPECT_GT(at_the_end({37, 38, 39, 40}), 0.8 * once);
-  EXPECT_LT(at_the_end({24, 40}), 0.8 * once);
-}
-
 TEST(PathErrors, ALoopThatIsOutvotedAddsNoCertainty) {
   Rng rng(5);
   FittedDrive drive(false, rng);

@@ -36,7 +36,7 @@ struct Capability {
 constexpr auto kCapabilities = std::to_array<Capability>({
     {MatcherKind::kVoting, 0.002, 0.002, 0.004, 0.2, Radians(20), 0.02, Radians(90), 0.01, true},
     {MatcherKind::kLineLsq, 0.002, 0.001, 0.003, 0.3, Radians(5), 0.02, Radians(90), 0.01, true},
-    {MatcherKind::kHough, 0.012, 0.006, 0.008, 0.7, Radians(30), 0.01, Radians(90), 0.01, true},
+    {MatcherKind::kHough, 0.012, 0.006, 0.009, 0.7, Radians(30), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kIcp, 0.002, 0.001, 0.003, 0.3, Radians(10), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kCorrelative, 0.012, 0.004, 0.006, 0.4, Radians(15), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kNdt, 0.002, 0.001, 0.004, 0.4, Radians(10), 0.01, Radians(90), 0.25, true},
