@@ -258,7 +258,7 @@ TEST(Mapper, AGridThatComesBackGetsWhatWasMappedMeanwhile) {
 // pose reports this with self_check on, from the second round on and not before. If the loop is closed, the
 // robot is localized again.
 TEST(Mapper, SaysSoWhereItDrawsTheMapBesideItself) {
-  const Drive drive = DriveLargeRing(44.0, 1.8);
+  const Drive drive = DriveLargeRing(44.0, 1.2);
   const auto drawn = [](const MapperSnapshot& snapshot) {
     return std::count_if(snapshot.keyframes.begin(), snapshot.keyframes.end(),
                          [](const Keyframe& keyframe) { return keyframe.localized; });
@@ -284,7 +284,7 @@ TEST(Mapper, SaysSoWhereItDrawsTheMapBesideItself) {
   EXPECT_EQ(drawn(snapshot), std::ssize(snapshot.keyframes));
   const auto told = run(FilterKind::kNone, true);
   EXPECT_LT(drawn(snapshot), std::ssize(snapshot.keyframes) - 10);  // It stops drawing beside itself ...
-  const auto closed = run(FilterKind::kFastSlam2Points, true, 0.1);
+  const auto closed = run(FilterKind::kFastSlam2Points, true, 0.05);
   EXPECT_EQ(drawn(snapshot), std::ssize(snapshot.keyframes));  // ... and what it left out is drawn once that is right.
   EXPECT_TRUE(std::any_of(closed.begin(), closed.end(), [](const ScanOutcome& o) { return !o.localized; }));
   ASSERT_GT(error_m(told.back()), 0.4) << "the slip must need correcting";
