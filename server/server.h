@@ -91,7 +91,7 @@ class Server {
   Atlas atlas_;
   Roster roster_;
   JobList jobs_;
-  SmoothJob smooth_;  // Used by the worker only.
+  SmoothJob smooth_;  // Used by the worker's thread that may change maps only.
   const RelocaliseJob relocalise_;
   JobWorker worker_;
   // Used by housekeeping only.

@@ -74,10 +74,9 @@ ExitCode AddEdit(Program& program, const DrawnEditArguments& arguments) {
   }
   // Before the edit, because a wall outside makes the map larger.
   const auto map = program.Ask([&](QueryClient& server) { return server.Map(arguments.site); });
-  if (!map) return program.Refuse(map.error());
   const auto added = program.Ask([&](QueryClient& server) { return server.AddMapEdit(arguments.site, edit); });
   if (!added) return program.Refuse(added.error());
-  const std::string warning = EditWarning(*added, *map);
+  const std::string warning = map ? EditWarning(*added, *map) : "";
   if (!warning.empty()) program.err() << "cairn: warning: edit " << added->id << ": " << warning << "\n";
   return program.Print(FormatEdit(*added), *added);
 }

@@ -3,7 +3,7 @@
 // (relocalise_job.h). One is submitted when the robot has been lost for jobs.relocalise_after_s, and again after twice
 // that time, and so on, because a job finds more when the robot has seen more. Other jobs may run meanwhile, of any
 // site (job_worker.h); but robots are looked for one at a time, the one first that waits longest, so that a person's
-// own search waits for one at most. None for a robot for which any job has not ended, and none for robots that look in
+// own search waits for one at most. None while any job for that robot is unfinished, and none for robots that look in
 // the map of their site by themselves (those that are only localised) or have no place in it (those that are not joined
 // with it). Thread rule: one thread (housekeeping).
 #pragma once

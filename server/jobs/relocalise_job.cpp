@@ -170,8 +170,7 @@ Result<JobOutcome> RelocaliseJob::Run(const Job& job, const JobControl& control)
   } else {
     message +=
         ": nothing was changed, because it has sent no scan, was found or lost anew, has itself found another place, "
-        "or "
-        "has got a new map meanwhile";
+        "or has got a new map meanwhile";
   }
   return std::move(looked->outcome);
 }

@@ -33,6 +33,7 @@ void JointMap::NoteLooks(SessionId session, const slam::OccupancyGrid::Looks& lo
 }
 
 void JointMap::Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
+  for (auto& [key, last] : last_looks_) last.Forget(session);  // What it has drawn lies elsewhere now.
   for (const auto& [key, chunk] : ChunksOf(session)) {
     if (!chunks.contains(key)) SetLayer(key, session, nullptr);
   }
@@ -158,22 +159,34 @@ slam::OccupancyGrid::Chunks JointMap::SumOfPast(const slam::OccupancyGrid::Chunk
 // The sum goes from the one that ended first to the last, so that the first ones can be summed before the others.
 void JointMap::MergePast(SessionId older, SessionId later) {
   const auto of_older = ChunksOf(older), of_later = ChunksOf(later);
-  const std::set<slam::ChunkKey> changed = dirty_;
+  std::set<slam::ChunkKey> changed = dirty_;
+  auto merged = SumOfPast(of_older, of_later);
+  for (auto& [key, last] : last_looks_) {
+    const auto one = of_older.find(key), two = of_later.find(key);
+    const std::uint8_t number = last.NumberOf(older);
+    if (one == of_older.end() || two == of_later.end() || number == 0) continue;
+    // Where the one that ended first has looked last, the other one's evidence is the older one.
+    auto both = std::make_shared<slam::GridChunk>(*two->second);
+    AddLater(*both, *one->second, most_past_);
+    for (std::size_t cell = 0; cell < kTileArea; ++cell)
+      if (last.numbers()[cell] != number) both->log_odds[cell] = merged.at(key)->log_odds[cell];
+    merged[key] = std::move(both);
+    last.Replace(older, later);
+    changed.insert(key);  // Where more sessions have looked, less is known of their order.
+  }
+  for (const auto& [key, chunk] : merged) SetLayer(key, later, chunk);
   for (const auto& [key, chunk] : of_older) SetLayer(key, older, nullptr);
-  for (const auto& [key, chunk] : SumOfPast(of_older, of_later)) SetLayer(key, later, chunk);
   std::vector<SessionId> in_order = past();
   const auto first = std::ranges::find(in_order, older), second = std::ranges::find(in_order, later);
   if (std::all_of(std::next(first), second, [this](SessionId between) { return hidden_.contains(between); }))
     dirty_ = changed;
   in_order.erase(second);
   *std::ranges::find(in_order, older) = later;
-  for (auto& [key, last] : last_looks_) last.Replace(older, later);
   SetPastOrder(in_order);
 }
 
 void JointMap::Remove(SessionId session) {
   Replace(session, {});
-  for (auto& [key, last] : last_looks_) last.Forget(session);
   hidden_.erase(session);
   std::vector<SessionId> in_order = past();
   std::erase(in_order, session);

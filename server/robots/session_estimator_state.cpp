@@ -85,6 +85,8 @@ Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (switch_completed_ && !*switch_completed_) return nullptr;
   if (pipeline_.mapper().draws_late()) return nullptr;  // It would draw them all.
+  // An older server of the same format would not read it, and the next scan ends this.
+  if (pipeline_.odometry_has_just_begun()) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });

@@ -111,10 +111,11 @@ std::vector<std::string> RobotStream::BeamTimesInDoubt(Clock::time_point now) co
   std::vector<std::string> doubts;
   for (const auto& [topic, lidar] : lidars_) {
     if (!lidar.round_at_once || now - lidar.received > kSilent) continue;
-    doubts.push_back(topic +
-                     ": time_increment is 0, so all its beams count as measured at once. If the lidar turns, the map "
-                     "is less exact wherever the robot turns: let its driver fill time_increment "
-                     "(`cairn-calibrate laser` measures the turn in a recording)");
+    doubts.push_back(
+        topic +
+        ": time_increment is 0, so all its beams count as measured at once. If the lidar turns (a "
+        "simulated one does not), the map is less exact wherever the robot turns: let its driver fill time_increment "
+        "(`cairn-calibrate laser` measures the turn in a recording)");
   }
   return doubts;
 }

@@ -247,8 +247,20 @@ bool RobotStream::odometry_is_fresh(Clock::time_point now) const {
   return odometry_stamp_ && now - odometry_received_ < kFresh;
 }
 
+// Something says where the base is: a transform from another odometry frame than the one that is set. A second one,
+// from the map, would give the base two parents.
+bool RobotStream::BaseHasAParent() const {
+  const std::vector<std::string> names = options_.base_names();
+  return std::ranges::any_of(names, [&](const std::string& name) {
+    return std::ranges::any_of(std::array{&frames_, &shared_frames_}, [&](const ros2::FrameTree* tree) {
+      const ros2::FrameTree::Link* const link = tree->Find(name);
+      return link != nullptr && std::ranges::find(names, link->parent) == names.end();
+    });
+  });
+}
+
 bool RobotStream::HasNoOdometry(Clock::time_point now) const {
-  return !odometry_stamp_ && !odometry_published_ && odometry_fault_.empty() && scans_since_ &&
+  return !BaseHasAParent() && !odometry_stamp_ && !odometry_published_ && odometry_fault_.empty() && scans_since_ &&
          now - *scans_since_ >= kNoOdometryAfter;
 }
 

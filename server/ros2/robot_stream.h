@@ -119,6 +119,7 @@ class RobotStream {
   bool Push(InboundValue&& value);
   void Send(const Odometry& odometry, const ros2::Origin& origin);
   [[nodiscard]] bool odometry_is_fresh(Clock::time_point now) const;
+  [[nodiscard]] bool BaseHasAParent() const;
   [[nodiscard]] bool HasNoOdometry(Clock::time_point now) const;
   void GuessBaseFrame();
   [[nodiscard]] std::string WhyNoOdometry(Clock::time_point now) const;

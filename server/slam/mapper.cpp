@@ -145,7 +145,8 @@ void Mapper::State::CloseLargeLoop() {
 // hypotheses have the same past, and no keyframe that something is still being done with.
 void Mapper::State::RetireKeyframes() {
   const RetireOptions& limits = options.retire;
-  if (!limits.enabled || !filter->retires() || !filter->placed() || drawing.redrawing()) return;
+  if (!limits.enabled || !filter->retires() || !filter->placed()) return;
+  if (drawing.redrawing() || drawing.late()) return;  // Soon.
   const auto from = static_cast<std::uint64_t>(std::min(limits.from_keyframes, options.max_keyframes / 2));
   const bool enough_new = trail.size() >= size_after_last_search + std::max(from, size_after_last_search) / 8;
   const bool full = trail.size() >= static_cast<std::uint64_t>(options.max_keyframes);
@@ -154,7 +155,6 @@ void Mapper::State::RetireKeyframes() {
   std::size_t end = trail.size() - std::min(trail.size(), static_cast<std::size_t>(limits.recent_keyframes));
   for (std::size_t i = 1; i < filter->hypothesis_count(); ++i) end = filter->hypothesis(i).path.SharedWith(path, end);
   if (const auto retirement = ChooseRetired(trail, path, end, limits)) {
-    drawing.DrawAllLate(trail.keyframes());
     trail.Retire(*retirement);
     filter->Retire(*retirement);
     loops.Retire(*retirement);

@@ -50,7 +50,7 @@ struct ScanOutcome {
 };
 
 // Whether odometry tells how a robot moves.
-enum class OdometryUse : std::uint8_t {
+enum class MotionSource : std::uint8_t {
   kUsed,
   kNone,    // It sends none, or the options say that it is not used.
   kStands,  // It stands still although the last keyframes show that the robot moves: wheels that are not measured.
@@ -77,7 +77,7 @@ class Mapper {
   // Whether the next scans come with odometry (PairedScan::has_odometry). It is not part of the state.
   void ExpectOdometry(bool has_odometry);
   // Where odometry is not used, scans alone show the motion (ForScansAlone) until it is there, or moves, again.
-  [[nodiscard]] OdometryUse odometry_use() const;
+  [[nodiscard]] MotionSource motion_source() const;
 
   // What was learned of the robot's odometry (tracking/odometry_learning.h), and the lag with which scans are to be
   // paired from now on (OdometryPairing::SetLag). Where scans alone show the motion, one of the names of

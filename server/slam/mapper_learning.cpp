@@ -32,9 +32,9 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
 
 std::vector<LearnedValue> Mapper::learned() const {
   std::vector<LearnedValue> values = state_->learning.values();
-  const OdometryUse use = state_->UseOfOdometry();
-  if (use == OdometryUse::kUsed || !state_->configured.front_end.use_odometry) return values;
-  const std::string_view name = use == OdometryUse::kNone ? kLearnedNoOdometry : kLearnedOdometryStands;
+  const MotionSource use = state_->UseOfOdometry();
+  if (use == MotionSource::kUsed || !state_->configured.front_end.use_odometry) return values;
+  const std::string_view name = use == MotionSource::kNone ? kLearnedNoOdometry : kLearnedOdometryStands;
   values.push_back({.name = std::string(name), .unit = "1", .value = 1.0, .applied = true});
   return values;
 }

@@ -34,9 +34,9 @@ bool Mapper::State::OdometryStands(const Pose2& T_odom_robot) const {
   return way_m >= kLeadAwayM || std::abs(turn_rad) >= kLeadAwayRad;
 }
 
-OdometryUse Mapper::State::UseOfOdometry() const {
-  if (!has_odometry || !configured.front_end.use_odometry) return OdometryUse::kNone;
-  return last_scan && OdometryStands(last_scan->T_odom_robot) ? OdometryUse::kStands : OdometryUse::kUsed;
+MotionSource Mapper::State::UseOfOdometry() const {
+  if (!has_odometry || !configured.front_end.use_odometry) return MotionSource::kNone;
+  return last_scan && OdometryStands(last_scan->T_odom_robot) ? MotionSource::kStands : MotionSource::kUsed;
 }
 
 void Mapper::State::UseOdometry(bool use) {
@@ -78,10 +78,10 @@ Passage Mapper::State::ChooseOdometry(Passage passage, const Scan& scan, const P
 void Mapper::ExpectOdometry(bool has_odometry) {
   State& s = *state_;
   s.has_odometry = has_odometry;
-  s.UseOdometry(s.UseOfOdometry() == OdometryUse::kUsed);
+  s.UseOdometry(s.UseOfOdometry() == MotionSource::kUsed);
 }
 
-OdometryUse Mapper::odometry_use() const {
+MotionSource Mapper::motion_source() const {
   return state_->UseOfOdometry();
 }
 

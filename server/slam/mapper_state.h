@@ -49,7 +49,7 @@ struct Mapper::State {
   // From the next scan on.
   void UseOdometry(bool use);
   [[nodiscard]] bool OdometryStands(const Pose2& T_odom_robot) const;
-  [[nodiscard]] OdometryUse UseOfOdometry() const;
+  [[nodiscard]] MotionSource UseOfOdometry() const;
   Passage ChooseOdometry(Passage passage, const Scan& scan, const Pose2& T_odom_robot);
   void Begin(ScanStep step) const { slam::Begin(front_end.watch(), step); }
   // Mapper::Process, with odometry as it is used.

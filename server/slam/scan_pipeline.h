@@ -61,6 +61,7 @@ class ScanPipeline {
 
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return pairing_.odometry_refused(); }
+  [[nodiscard]] bool odometry_has_just_begun() const { return pairing_.odometry_has_just_begun(); }
   [[nodiscard]] Mapper& mapper() { return mapper_; }
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
 

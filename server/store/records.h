@@ -143,7 +143,7 @@ inline constexpr std::size_t kMostSwitches = 1024;
 inline constexpr std::size_t kMostStoredEdits = 8192;
 inline constexpr std::uint64_t kMaxEditsVersion = std::uint64_t{1} << 53;
 
-// How much a site has given up so far to stay below its limit of memory (maps/site_memory.cpp).
+// How much a site has given up so far to stay below its limit of memory (maps/memory_keeper.h).
 struct GivenUp {
   std::uint32_t versions = 0;  // Map versions that were removed.
   std::uint32_t layers = 0;    // Layers of earlier sessions that became part of another one.

@@ -44,7 +44,7 @@ void BlockCholesky::LookWhereBlocksLie(std::span<const Edge> edges) {
   for (std::size_t k = 0; k < nodes; ++k) {
     std::vector<std::uint32_t>& column = rows[k];
     std::ranges::sort(column);
-    column.erase(std::ranges::unique(column).begin(), column.end());
+    column.erase(std::unique(column.begin(), column.end()), column.end());
     row_.insert(row_.end(), column.begin(), column.end());
     begin_.push_back(row_.size());
     if (column.size() < 2) continue;

@@ -209,7 +209,12 @@ PoseGraphSummary OptimiseLoopGraph(std::vector<Pose2>& poses, std::span<const Po
   for (std::size_t i = 1; i < ends.size(); ++i)
     if (ends[i] > ends[i - 1] + 1) add(Composed(steps, ends[i - 1], ends[i]));
 
-  const PoseGraphSummary summary = FitEnds(end_poses, between_ends, options);
+  const std::vector<Pose2> guess = end_poses;
+  PoseGraphSummary summary = FitEnds(end_poses, between_ends, options);
+  if (!summary.usable) {  // Steps without damping can miss from a bad guess.
+    end_poses = guess;
+    summary = OptimisePoses(end_poses, between_ends, options);
+  }
   if (!summary.usable) return summary;
   for (std::size_t i = 0; i < ends.size(); ++i) poses[ends[i]] = end_poses[i];
   for (std::size_t i = 1; i < ends.size(); ++i)

@@ -85,8 +85,8 @@ Disagreement ScanComparison::Compare(const Scan& scan, const Pose2& T_map_robot,
       for (int x = low.x; x <= high.x; ++x) blocks.push_back({x, y});
   });
   std::ranges::sort(blocks);
-  const auto twice = std::ranges::unique(blocks);
-  blocks.erase(twice.begin(), twice.end());
+  const auto twice = std::unique(blocks.begin(), blocks.end());
+  blocks.erase(twice, blocks.end());
   return sum;
 }
 

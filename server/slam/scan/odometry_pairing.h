@@ -50,14 +50,14 @@ struct PairingOptions {
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
-// What lies between a scan and the one before it. If several of the first four apply, the last of them counts.
+// What lies between a scan and the one before it. Where several of the first four apply, the last of them counts. Where
+// kOdometryBegan and another one but kDriven apply, kUnknown counts.
 enum class Passage : std::uint8_t {
   kDriven = 0,  // The robot was watched all the way.
   kPaused,      // Scans are missing for some time. Odometry says how the robot moved, if nobody carried it.
   kUnwatched,   // As kPaused, but its length is unknown, or another client continues.
   kUnknown,     // The odometry began anew or jumped: nothing says where the robot is now.
-  // As kDriven, but this is the first scan with odometry after others without. If another of these applies as well,
-  // kUnknown counts.
+  // As kDriven, but this is the first scan with odometry after others without.
   kOdometryBegan,
 };
 
@@ -109,6 +109,8 @@ class OdometryPairing {
   // PairingOptions::laser_lag_s. At most kMostLagS either way: so much odometry is kept.
   static constexpr double kMostLagS = 1.0;
   void SetLag(double lag_s);
+  // The first odometry after scans without it has come, and no scan since then.
+  [[nodiscard]] bool odometry_has_just_begun() const { return passage_ == Passage::kOdometryBegan; }
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return odometry_refused_; }
 

@@ -1,6 +1,8 @@
 // The points of a scan with the direction of the surface on which they lie, thinned to a bounded number.
-// Point-to-line matching works with them. Points are in the robot frame of the scan. Stateless, thread-safe.
-// Source: point-to-line metric of Censi, ICRA 2008; thinning after thesis C 4.4.3.
+// Point-to-line matching works with them. A point of a smooth surface is the mean of the hits around it: to take single
+// hits that are far enough apart would prefer those that noise leads away from the last one. Points are in the robot
+// frame of the scan. Stateless, thread-safe. Source: point-to-line metric of Censi, ICRA 2008; thinning after thesis
+// C 4.4.3.
 #pragma once
 
 #include <Eigen/Core>

@@ -73,6 +73,9 @@ TEST(JointMap, OfTwoRobotsThatGoOnTheOneThatLookedLastIsBelieved) {
   EXPECT_EQ(cell(20), 8);
   map.SetPast(2);
   map.MergePast(1, 2);
+  map.Render();
+  EXPECT_GT(cell(0), 90) << "of the two that are one now, the first had looked last here";
+  EXPECT_EQ(cell(20), 8) << "and the second here";
   map.Remove(2);
   map.Render();
   EXPECT_TRUE(map.cells().empty());

@@ -225,7 +225,6 @@ TEST(MapperFollows, WhatAnAdoptedGridLacksIsDrawnSomeAtATimeAndBeforeACheckpoint
   EXPECT_EQ(ShareMissing(mapper.grid(), expected), 0.0);
 }
 
-// A path that does not belong to the keyframes is not taken.
 // What was seen again since the last large loop has corrected the pose at once. At the end it corrects the way to
 // there, so that a job finds nothing more, and what is drawn lies along that path.
 TEST(MapperFollows, AtTheEndThePathFitsAllThatWasSeenAgain) {
@@ -260,6 +259,7 @@ TEST(MapperFollows, AtTheEndThePathFitsAllThatWasSeenAgain) {
   EXPECT_EQ(sampled.BestPath(), path) << "nobody wants it fitted";
 }
 
+// A path that does not belong to the keyframes is not taken.
 TEST(MapperFollows, APathOfAnotherLengthDoesNotMoveTheEstimator) {
   const Drive drive = DriveRound();
   MapperOptions options;
