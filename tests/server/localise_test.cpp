@@ -167,7 +167,7 @@ TEST(Localise, RobotsInTheSameMapShareIt) {
       ASSERT_TRUE(Ask(house, RequestKind::kLocalise, robot).ok());
       house.Drive(robot, client, 0, 30);
       EXPECT_TRUE(LastPoseOf(house, robot).localized) << robot;
-      ASSERT_TRUE(first->WaitFor([&] { return DurableScans(house, robot) == 30; }));
+      ASSERT_TRUE(first->WaitFor([&house, name = robot] { return DurableScans(house, name) == 30; }));
     }
     EXPECT_EQ(house.server().known_maps(), 1U);
   }
