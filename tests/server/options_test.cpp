@@ -41,7 +41,7 @@ TEST(ServerOptions, EveryRobotFindsRoomForAMessage) {
 
 TEST(ServerOptions, MoreJobsAreKeptThanWait) {
   EXPECT_EQ(Contradiction({"jobs.max_queued=256"}), "jobs.max_queued (256) must be below half of jobs.max_kept (256)");
-  EXPECT_EQ(Contradiction({"jobs.max_queued=255"}), "");
+  EXPECT_EQ(Contradiction({"jobs.max_queued=127"}), "");
 }
 
 TEST(ServerOptions, RulesOfTheEstimatorCountToo) {

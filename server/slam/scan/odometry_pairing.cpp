@@ -150,8 +150,7 @@ void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
 // Whether the first scans have waited long enough for the first odometry.
 bool OdometryPairing::WaitsInVain() const {
   if (newest_ || scans_.empty()) return false;
-  return scans_.size() >=
-             static_cast<std::size_t>(std::min(options_.no_odometry_after_scans, options_.max_waiting_scans)) ||
+  return scans_.size() >= static_cast<std::size_t>(options_.no_odometry_after_scans) ||
          NanosBetween(scans_.front()->stamp, scans_.back()->stamp) >= Nanos(options_.no_odometry_after_s);
 }
 
