@@ -21,8 +21,8 @@ namespace cairn {
 struct ScanPlacing {
   Pose2 T_map_robot;      // At the first beam.
   double height_m = 0.0;  // Height of the laser's tilt axis above the floor.
-  std::optional<Pose2>
-      T_map_robot_last{};  // At the last beam; nothing if the robot stood, or all beams are of one time.
+  // At the last beam; nothing if the robot stood, or all beams are of one time.
+  std::optional<Pose2> T_map_robot_last{};
 };
 
 // Appends one point per hit within `max_range_m`, in the order of the beams.

@@ -164,13 +164,15 @@ void JointMap::MergePast(SessionId older, SessionId later) {
   for (auto& [key, last] : last_looks_) {
     const auto one = of_older.find(key), two = of_later.find(key);
     const std::uint8_t number = last.NumberOf(older);
-    if (one == of_older.end() || two == of_later.end() || number == 0) continue;
-    // Where the one that ended first has looked last, the other one's evidence is the older one.
-    auto both = std::make_shared<slam::GridChunk>(*two->second);
-    AddLater(*both, *one->second, most_past_);
-    for (std::size_t cell = 0; cell < kTileArea; ++cell)
-      if (last.numbers()[cell] != number) both->log_odds[cell] = merged.at(key)->log_odds[cell];
-    merged[key] = std::move(both);
+    if (number == 0) continue;
+    if (one != of_older.end() && two != of_later.end()) {
+      // Where the one that ended first has looked last, the other one's evidence is the older one.
+      auto both = std::make_shared<slam::GridChunk>(*two->second);
+      AddLater(*both, *one->second, most_past_);
+      for (std::size_t cell = 0; cell < kTileArea; ++cell)
+        if (last.numbers()[cell] != number) both->log_odds[cell] = merged.at(key)->log_odds[cell];
+      merged[key] = std::move(both);
+    }
     last.Replace(older, later);
     changed.insert(key);  // Where more sessions have looked, less is known of their order.
   }

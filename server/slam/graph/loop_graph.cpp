@@ -72,7 +72,7 @@ class EndsFit {
 
   // Half the sum of the squared normalised errors, those of loops after the robust loss of this width.
   double CostAt(const std::vector<Pose2>& poses, double loss_width) { return Look<false>(poses, loss_width); }
-  // The same, and the linear system for StepFrom.
+  // The same, and sets the linear system up for Step.
   double LineariseAt(const std::vector<Pose2>& poses, double loss_width) { return Look<true>(poses, loss_width); }
 
   // Moves the poses by a step of Gauss and Newton. False if the system has no solution. REQUIRES: they are those of the
