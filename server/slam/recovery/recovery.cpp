@@ -26,6 +26,8 @@ constexpr double kDriftPerM = 0.01;
 constexpr double kDriftRadPerM = 0.0005;
 constexpr double kFarthestM = 10.0;
 constexpr double kEverywhereEveryM = 4.0;
+constexpr double kPartM = 6.0;        // Of the last stretch, ...
+constexpr double kWholeEveryM = 0.4;  // ... and on how much way that is taken, and then the whole.
 // Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
 // its path is waited for by nobody. One that is lost, or may have been carried, is to be found soon.
 constexpr int kBlocksOnPath = 60'000;
@@ -148,10 +150,16 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
                            std::nextafter(before_m, std::numeric_limits<double>::infinity()));
   }
   recent_.push_back({keyframe.scan.Share(), step.T_track_robot, travelled_m, std::move(points_robot)});
-  // Not those that are being searched for.
-  while (!search_.searching() && (recent_.size() > kMaxRecent || travelled_m - recent_.front().travelled_m > kStretchM))
-    recent_.erase(recent_.begin());
+  if (!search_.searching()) KeepLastStretch();  // Otherwise some of them are being searched for.
   if (held_.size() > kMaxHeld) LeavePath();
+}
+
+void Recovery::KeepLastStretch() {
+  const auto kept = std::ranges::find_if(
+      recent_, [&](const RecentScan& one) { return recent_.back().travelled_m - one.travelled_m <= kStretchM; });
+  const std::size_t old =
+      std::max(static_cast<std::size_t>(kept - recent_.begin()), recent_.size() - std::min(recent_.size(), kMaxRecent));
+  recent_.erase(recent_.begin(), recent_.begin() + static_cast<std::ptrdiff_t>(old));
 }
 
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
@@ -172,7 +180,8 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
   if (contradicted_ && !followed) LeavePath();
   if (said_) {
     const auto [reach_m, reach_rad] = followed ? ReachOfTrack() : std::pair(0.0, 0.0);
-    const auto place = search_.FindNear(map, recent_, T_map_robot, reach_m, reach_rad);
+    const auto place = search_.FindNear(map, followed ? LastPart() : std::span(std::as_const(recent_)), T_map_robot,
+                                        reach_m, reach_rad);
     // Farther from where the track leads, one search is no proof.
     if (place && (!followed || IsNear(T_map_robot, place->T_map_robot) ||
                   IsConfirmed(place->T_map_robot, recent_.back().travelled_m)))
@@ -207,7 +216,10 @@ std::optional<FoundPlace> Recovery::SearchOn(const SearchedMap& map) {
   if (!unconfirmed_.empty()) every_m = std::max(every_m, loop_.confirm_after_m);
   const bool due =
       searched_at_m_ == kNever ? !followed || travelled_m >= every_m : travelled_m - searched_at_m_ >= every_m;
-  if (due) BeginSearch(map, recent_);
+  if (due) {
+    KeepLastStretch();  // Where one search follows the other, scans are let go of only here.
+    BeginSearch(map, recent_);
+  }
   return std::nullopt;
 }
 
@@ -239,6 +251,16 @@ void Recovery::SearchAgain(const SearchedMap& map) {
 bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const {
   const Pose2 error = Between(T_map_believed, T_map_found);
   return error.translation().norm() < options_.on_path_m && std::abs(error.theta) < options_.on_path_rad;
+}
+
+// A robot that comes back into the map has seen for some metres what the map does not show, and that would count
+// against its place. So the last stretch is taken now whole, now only its last part.
+std::span<const RecentScan> Recovery::LastPart() const {
+  const double way_m = recent_.back().travelled_m;
+  const bool whole = static_cast<std::int64_t>(way_m / kWholeEveryM) % 2 == 0;
+  const auto first = std::ranges::find_if(
+      recent_, [&](const RecentScan& one) { return way_m - one.travelled_m <= (whole ? kStretchM : kPartM); });
+  return {first, recent_.end()};
 }
 
 // How far from where the track leads the robot may be.

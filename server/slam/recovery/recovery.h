@@ -217,12 +217,15 @@ class Recovery {
   void RestorePoints();
   [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
   void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
+  // Of the recent scans: those of the last kStretchM, at most kMaxRecent. REQUIRES: none is being searched for.
+  void KeepLastStretch();
   void LeavePath();
   void BeginSearch(const SearchedMap& map, std::span<const RecentScan> recent);
   void StopSearch();
   void SearchAgain(const SearchedMap& map);
   [[nodiscard]] int BlocksPerScan() const;
   [[nodiscard]] std::optional<FoundPlace> SearchOn(const SearchedMap& map);
+  [[nodiscard]] std::span<const RecentScan> LastPart() const;
   [[nodiscard]] std::pair<double, double> ReachOfTrack() const;
   [[nodiscard]] bool IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const;
   // `seen_m`: the way at the last of the scans that were searched for.

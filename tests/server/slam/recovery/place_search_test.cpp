@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -340,6 +341,42 @@ TEST_F(Lost, OnlyPlacesThatAreTheSameConfirmEachOther) {
   EXPECT_FALSE(ConfirmEachOther(place, {4.4, 2.4, 3.1}));
   EXPECT_TRUE(ConfirmEachOther(place, {4.0, 2.0, -kPi + 0.01}));
   EXPECT_FALSE(ConfirmEachOther(place, {4.0, 2.0, -kPi + 0.05}));
+}
+
+// A robot that drives far where its map shows nothing, so fast that one search follows the other. What it saw long ago
+// would keep it from being found where it comes into its map again.
+TEST_F(Lost, IsLookedForWithTheLastStretchOnly) {
+  const test::World other = Hall(11);
+  Recovery recovery = Make();
+  recovery.Begin(KnownAt(10), false);
+  for (double way_m = 0.0; way_m < 100.0; way_m += 1.0) {
+    const double x = std::abs(std::remainder(way_m, 2.0 * 38.0));
+    const RecentScan scan = ScanAt(other, {x, 0, 0}, T_track_world_, 0.0, rng_);
+    TrackStep step;
+    step.T_track_robot = scan.T_track_robot;
+    step.matched = true;
+    EXPECT_FALSE(recovery.Take({scan.scan, {}}, step, scan.points, MapOfHall().searched)) << way_m;
+    const double kept_m = recovery.recent().back().travelled_m - recovery.recent().front().travelled_m;
+    ASSERT_LE(kept_m, kStretchM + 10.0) << way_m;  // A search takes some scans.
+  }
+}
+
+// A robot that is followed from where its map shows nothing back into it, with an error that one search does not
+// prove: what it saw before keeps it from being found only for some metres.
+TEST_F(Lost, WhereTheTrackComesBackIntoTheMapTheRobotIsFoundWithWhatItSawLast) {
+  constexpr double kMapFromM = 22.0;
+  const Map map(world_, kMapFromM);
+  Recovery recovery = Make();
+  recovery.BeginNear(KnownAt(0), Pose2{0.6, 0.0, 0.0} * T_track_world_.Inverse());
+  std::optional<double> found_m;
+  for (double way_m = 0.0; way_m < 37.0 && !found_m; way_m += 0.25) {
+    const auto found = Take(recovery, {way_m, 0, 0}, {way_m, 0, 0}, map.searched);
+    if (!found) continue;
+    found_m = way_m;
+    EXPECT_NEAR(found->place.T_map_robot.x, way_m, 0.05);
+  }
+  ASSERT_TRUE(found_m);
+  EXPECT_LT(*found_m, kMapFromM + 5.0);  // 9 m later with the whole stretch alone.
 }
 
 // A robot that turns on one spot for an hour.
