@@ -16,15 +16,23 @@ constexpr double kGuessSigmaM = 0.1;  // The alignment may correct the pose by s
 constexpr double kGuessSigmaRad = 0.03;
 constexpr double kMapSigmaM = 0.02;  // Errors of the map: less than half a cell.
 constexpr double kMapSigmaRad = 0.003;
+// With more doubt than this the robot is followed on, but not told as localized: three standard deviations reach half a
+// metre, which is another place.
+constexpr double kToldSigmaM = 0.17;
+constexpr double kToldSigmaRad = 0.07;
 constexpr double kLostSigmaM = 0.5;  // With more doubt than this the robot is lost.
 constexpr double kLostSigmaRad = 0.15;
 constexpr double kCompareEveryM = 0.5;  // As the self-check of a robot that maps.
 constexpr double kStretchOfComparisonsM = 5.0;
 constexpr int kMinCompared = 100;  // Points over a stretch.
 
-bool IsTooDoubtful(const Eigen::Matrix3d& covariance) {
-  const double most = kLostSigmaM * kLostSigmaM;
-  return covariance(0, 0) > most || covariance(1, 1) > most || covariance(2, 2) > kLostSigmaRad * kLostSigmaRad;
+bool IsBeyond(const Eigen::Matrix3d& covariance, double sigma_m, double sigma_rad) {
+  const double most = sigma_m * sigma_m;
+  return covariance(0, 0) > most || covariance(1, 1) > most || covariance(2, 2) > sigma_rad * sigma_rad;
+}
+
+PoseReason Told(PoseReason reason, const Eigen::Matrix3d& covariance) {
+  return IsBeyond(covariance, kToldSigmaM, kToldSigmaRad) ? PoseReason::kLost : reason;
 }
 
 // The symmetric part of a matrix without its negative eigenvalues.
@@ -90,8 +98,9 @@ GridLocalisation::Place GridLocalisation::CarriedTo(const Pose2& T_odom_robot) c
   const Pose2 moved = Between(T_odom_robot_, T_odom_robot);
   const Eigen::Matrix3d J = J_compose_right(last_.T_map_robot, moved);
   const double blind_m = unmatched_m_ + moved.translation().norm();
-  return {last_.T_map_robot * moved, last_.covariance + J * options_.blind.Covariance(moved) * J.transpose(),
-          blind_m > options_.lost_after_m ? PoseReason::kLost : PoseReason::kOdometryOnly};
+  const Eigen::Matrix3d covariance = last_.covariance + J * options_.blind.Covariance(moved) * J.transpose();
+  const PoseReason reason = blind_m > options_.lost_after_m ? PoseReason::kLost : PoseReason::kOdometryOnly;
+  return {last_.T_map_robot * moved, covariance, Told(reason, covariance)};
 }
 
 GridLocalisation::Followed GridLocalisation::Take(const Sight& sight) {
@@ -183,12 +192,12 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
     blind_covariance_.setZero();
     contradicted = Contradicted(sight, now.T_map_robot);
   }
-  last_ = {now.T_map_robot, now.covariance, reason};
+  last_ = {now.T_map_robot, now.covariance, Told(reason, now.covariance)};
   T_odom_robot_ = sight.scan.T_odom_robot;
   T_track_kept_ = step.T_track_robot;
   if (contradicted) {
     Lose(true);
-  } else if (unmatched_m_ > options_.lost_after_m || IsTooDoubtful(now.covariance)) {
+  } else if (unmatched_m_ > options_.lost_after_m || IsBeyond(now.covariance, kLostSigmaM, kLostSigmaRad)) {
     LookNear();
   }
   return {last_, moved_enough && (step.matched || fixed)};

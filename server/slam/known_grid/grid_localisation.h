@@ -1,7 +1,8 @@
 // Follows a robot in a map that it does not change. Between the fixes the front-end carries the pose; about every
 // quarter of a metre the scan is aligned with the surfaces of the map, and the answer is fused with the pose. Where the
-// map shows nothing, the pose goes on with growing doubt. The robot is lost where that doubt is too large, or where the
-// scans contradict the map over some metres, and it is doubted where somebody may have carried it between two scans
+// map shows nothing, the pose goes on with growing doubt. Where three standard deviations reach another place it is not
+// told as localized, but followed on. The robot is lost where that doubt is too large, or where the scans contradict
+// the map over some metres, and it is doubted where somebody may have carried it between two scans
 // (recovery/carried.h). It is then looked for as one that was not watched (recovery.h), in this map, until it is found:
 // unlike a robot that maps, it does not go on along its path where it is found nowhere else. People, and
 // furniture that has moved, contradict in some places; that is borne, because it does not contradict for metres

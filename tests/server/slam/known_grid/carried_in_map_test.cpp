@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -98,6 +99,32 @@ TEST(LocaliseIn, ARobotWhoseScansShowNothingKnownIsNotLocalizedForLong) {
     const Carried carried = CarryUnseen(from, to, options);
     EXPECT_TRUE(carried.noticed) << from << " to " << to;
     EXPECT_EQ(carried.wrong_later, 0U) << from << " to " << to;
+  }
+}
+
+// The map shows only where the robot starts. Farther away it is followed, and told as localized as long as three
+// standard deviations stay below half a metre.
+TEST(LocaliseIn, ARobotOutsideOfTheMapIsNotLocalizedWhereItsDoubtReachesAnotherPlace) {
+  constexpr double kMostSigmaM = 0.5 / 3.0;
+  const Eigen::Vector2d start = Mapped().drive.T_map_robot_start.translation();
+  KnownGrid::Source source = Mapped().map->source();
+  const double side_m = source.resolution_m * kTileCells;
+  std::erase_if(source.tiles, [&](const auto& tile) {
+    const Eigen::Vector2d middle = side_m * Eigen::Vector2d(tile.first.x + 0.5, tile.first.y + 0.5);
+    return (middle - start).norm() > 1.5 * side_m;
+  });
+  MapperOptions options = Mapped().options;
+  options.filter.back_end.drift.trans_per_m *= 5.0;  // Enough for that within this drive.
+  const auto map =
+      std::make_shared<const KnownGrid>(std::move(source), options.recovery.place, options.self_check.near_m);
+  Localised robot(Mapped().drive.T_map_robot_start, options);
+  EXPECT_TRUE(robot.pipeline.mapper().LocaliseIn(map, true));
+  robot.Add(0, Mapped().drive.records.size());
+  EXPECT_GT(robot.localized(), 50U);
+  EXPECT_LT(robot.localized(), robot.outcomes.size());
+  for (const ScanOutcome& one : robot.outcomes) {
+    const double sigma_m = std::sqrt(one.covariance.diagonal().head<2>().maxCoeff());
+    EXPECT_TRUE(!one.localized || sigma_m < 1.1 * kMostSigmaM) << sigma_m;
   }
 }
 
