@@ -1,6 +1,7 @@
 #include "server/slam/recovery/recovery.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -26,8 +27,9 @@ constexpr double kDriftPerM = 0.01;
 constexpr double kDriftRadPerM = 0.0005;
 constexpr double kFarthestM = 10.0;
 constexpr double kEverywhereEveryM = 4.0;
-constexpr double kPartM = 6.0;        // Of the last stretch, ...
-constexpr double kWholeEveryM = 0.4;  // ... and on how much way that is taken, and then the whole.
+// The stretches with which it is looked for near the track, and on how much way with one of them.
+constexpr std::array kStretchesM = {kStretchM, 6.0, 3.0};
+constexpr double kNextStretchM = 0.25;
 // Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
 // its path is waited for by nobody. One that is lost, or may have been carried, is to be found soon.
 constexpr int kBlocksOnPath = 60'000;
@@ -254,12 +256,12 @@ bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) con
 }
 
 // A robot that comes back into the map has seen for some metres what the map does not show, and that would count
-// against its place. So the last stretch is taken now whole, now only its last part.
+// against its place. So now the whole last stretch is taken, now only its last part.
 std::span<const RecentScan> Recovery::LastPart() const {
   const double way_m = recent_.back().travelled_m;
-  const bool whole = static_cast<std::int64_t>(way_m / kWholeEveryM) % 2 == 0;
-  const auto first = std::ranges::find_if(
-      recent_, [&](const RecentScan& one) { return way_m - one.travelled_m <= (whole ? kStretchM : kPartM); });
+  const double stretch_m = kStretchesM[static_cast<std::size_t>(way_m / kNextStretchM) % kStretchesM.size()];
+  const auto first =
+      std::ranges::find_if(recent_, [&](const RecentScan& one) { return way_m - one.travelled_m <= stretch_m; });
   return {first, recent_.end()};
 }
 
