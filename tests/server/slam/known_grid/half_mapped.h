@@ -8,21 +8,11 @@
 #include <variant>
 #include <vector>
 
-#include "server/slam/known_grid/known_grid.h"
 #include "server/slam/scan_pipeline.h"
+#include "tests/server/slam/known_grid_of.h"
 #include "tests/server/slam/simulated_drive.h"
 
 namespace cairn::slam::test {
-
-inline std::shared_ptr<const KnownGrid> KnownGridOf(const OccupancyGrid& grid) {
-  const MapperOptions options;
-  KnownGrid::Tiles tiles;
-  grid.ForEachChunk([&](const ChunkKey& key, const GridChunk& chunk) {
-    tiles.emplace(key, std::make_shared<const TileCells>(OccupanciesOf(chunk)));
-  });
-  return std::make_shared<const KnownGrid>(KnownGrid::Source{std::move(tiles), grid.options().resolution_m, 0},
-                                           options.recovery.place, options.self_check.near_m);
-}
 
 // A robot that has mapped the first half of a drive, and the records of the second.
 struct HalfMapped {
