@@ -24,6 +24,10 @@ constexpr double kAgreementM = 0.5;
 void Visit(OptionVisitor& visitor, FastSlamOptions& options) {
   visitor.Real("sample_distance_m", options.sample_distance_m, "m", 0.0, 1000.0,
                "FastSLAM 2.0 draws the motion of a particle without an observation after this way.");
+  visitor.Real(
+      "drawn_share", options.drawn_share, "1", 0.0, 1.0,
+      "FastSLAM 2.0 draws with this share of the standard deviations. 1 draws as theses A and C print it; with "
+      "less, the path of each particle has less noise, and they spread less.");
   visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,
                "The particles are resampled when the effective sample size falls below this share of their number.");
 }
@@ -60,7 +64,7 @@ void ParticleSet::PredictBySampling(const StepMotion& measured) {
     if (!more) continue;
     const Eigen::Matrix3d J = J_compose_right(before, step.T_prev_curr);
     particle.covariance = J * step.covariance_prev * J.transpose();
-    Sample(i);
+    Draw(i, 1.0);
   }
 }
 
@@ -254,13 +258,13 @@ std::size_t ParticleSet::MostLikelyNear(const Pose2& T_map_robot) const {
   return best;
 }
 
-void ParticleSet::Sample(std::size_t index) {
+void ParticleSet::Draw(std::size_t index, double share) {
   Particle& particle = particles_[index];
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
   solver.computeDirect(particle.covariance);
   const Eigen::Vector3d spread = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   const Eigen::Vector3d draw = ThreeNormalDraws(rng_);
-  const Eigen::Vector3d step = solver.eigenvectors() * spread.cwiseProduct(draw);
+  const Eigen::Vector3d step = solver.eigenvectors() * (share * spread).cwiseProduct(draw);
   particle.T_map_robot = Plus(particle.T_map_robot, step);
   particle.covariance.setZero();
 }

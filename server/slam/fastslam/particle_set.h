@@ -2,8 +2,8 @@
 // and the reported estimate. The filter stores their landmarks. Frames: T_map_robot; revisits in the robot
 // frame of the old keyframe. Between observations a particle moves along the matched motion and only its
 // covariance grows; its pose is sampled when an observation arrives or when `sample_distance_m` has been
-// travelled. Not thread-safe. Deterministic for a given seed. Source: thesis A 4.3, Tables 4.2, 4.6, 4.8,
-// 4.9; Montemerlo 2003.
+// travelled, closer to the mean than the covariance says (`drawn_share`, README.md). Not thread-safe. Deterministic for
+// a given seed. Source: thesis A 4.3, Tables 4.2, 4.6, 4.8, 4.9; Montemerlo 2003.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,6 +25,7 @@ namespace cairn::slam {
 
 struct FastSlamOptions {
   double sample_distance_m = 1.0;
+  double drawn_share = 0.5;
   double resample_below = 0.5;
 };
 void Visit(OptionVisitor& visitor, FastSlamOptions& options);
@@ -93,8 +94,8 @@ class ParticleSet {
   }
   [[nodiscard]] std::vector<double> weights() const;  // Normalised weights.
   [[nodiscard]] std::vector<WeightedPose> belief() const;
-  // Draws the pose of a particle from N(xv, pv) and sets its covariance to zero.
-  void Sample(std::size_t index);
+  // Draws the pose of a particle from N(xv, drawn_share^2 pv) and sets its covariance to zero.
+  void Sample(std::size_t index) { Draw(index, options_.drawn_share); }
   void SampledAll() { travelled_ = 0.0; }
 
   // Ends the step: samples the particles if that is due, appends the pose to every path, and resamples if the
@@ -132,6 +133,8 @@ class ParticleSet {
   }
 
  private:
+  // Draws the pose of a particle with this share of its standard deviations.
+  void Draw(std::size_t index, double share);
   std::vector<int> Resample(std::vector<double>& left);
   // How many poses of their paths all particles share.
   [[nodiscard]] std::size_t SharedByAll() const;

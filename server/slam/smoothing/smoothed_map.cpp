@@ -1,5 +1,6 @@
 #include "server/slam/smoothing/smoothed_map.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -57,6 +58,13 @@ bool IsChosenByScans(const MapperSnapshot& snapshot) {
   return snapshot.pose_graph.enabled && snapshot.relations.empty();
 }
 
+// True if so few places were seen again that one wrong relation, which no other contradicts, may have bent the path.
+bool IsJudgedByScans(const MapperSnapshot& snapshot) {
+  constexpr std::ptrdiff_t kFew = 10;
+  return snapshot.pose_graph.enabled && !snapshot.relations.empty() &&
+         std::ranges::count_if(snapshot.relations, &PoseRelation::loop) <= kFew;
+}
+
 // The best particle's path is one sample of many, and the online path their mean. So the sample is taken only where the
 // scans clearly agree better with it.
 std::optional<std::vector<Pose2>> ChosenPath(const MapperSnapshot& snapshot, const GridOptions& options,
@@ -66,6 +74,17 @@ std::optional<std::vector<Pose2>> ChosenPath(const MapperSnapshot& snapshot, con
   const auto sample = DisagreementWithOthers(snapshot.full_path, snapshot, options, next);
   if (!sample) return {};
   return IsClearlySmaller(*sample, *online) ? snapshot.full_path : snapshot.online_path;
+}
+
+// A path that was fitted to few relations, unless the scans clearly agree better with the online one. A large loop that
+// is right makes few scans agree better, so that the fitted path need not be clearly better.
+std::optional<std::vector<Pose2>> JudgedPath(const MapperSnapshot& snapshot, std::vector<Pose2> fitted,
+                                             const GridOptions& options, const std::function<bool()>& next) {
+  const auto online = DisagreementWithOthers(snapshot.online_path, snapshot, options, next);
+  if (!online) return {};
+  const auto after = DisagreementWithOthers(fitted, snapshot, options, next);
+  if (!after) return {};
+  return IsClearlySmaller(*online, *after) ? snapshot.online_path : std::move(fitted);
 }
 
 // The smoothed one first, because after a job the robot's online path is what the job has smoothed.
@@ -106,7 +125,8 @@ std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<
 }
 
 std::size_t SmoothingSteps(const MapperSnapshot& snapshot, bool fitted_elsewhere) {
-  const std::size_t per_keyframe = IsChosenByScans(snapshot) && !fitted_elsewhere ? 8 : 4;
+  const bool compares = (IsChosenByScans(snapshot) || IsJudgedByScans(snapshot)) && !fitted_elsewhere;
+  const std::size_t per_keyframe = compares ? 8 : 4;
   return per_keyframe * snapshot.keyframes.size();
 }
 
@@ -117,6 +137,7 @@ std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridO
   auto online = DrawMap(snapshot, snapshot.online_path, options, earlier, next);
   if (!online) return {};
   auto path = IsChosenByScans(snapshot) ? ChosenPath(snapshot, options, next) : SmoothedPath(snapshot, go_on);
+  if (path && IsJudgedByScans(snapshot)) path = JudgedPath(snapshot, *std::move(path), options, next);
   if (!path) return {};
   auto smoothed = *path == snapshot.online_path ? online : DrawMap(snapshot, *path, options, earlier, next);
   if (!smoothed) return {};

@@ -2,9 +2,9 @@
 // the scans agree with this grid and with the grid along the online path. If no place was seen again there is
 // nothing to optimise. Then two paths are compared, the best particle's (one sample of many) and the online
 // path (their mean), and the result is the online path, unless the scans clearly agree better with the other one: each
-// scan is compared with a map in which it was not drawn. With `pose_graph.enabled` off it is always the best particle's
-// path (thesis A 5.4).
-// Stateless, thread-safe, deterministic. May take seconds on long paths.
+// scan is compared with a map in which it was not drawn. Where few places were seen again, the fitted path is not taken
+// if the scans clearly agree better with the online path. With `pose_graph.enabled` off it is always the best
+// particle's path (thesis A 5.4). Stateless, thread-safe, deterministic. May take seconds on long paths.
 #pragma once
 
 #include <functional>

@@ -150,11 +150,14 @@ void RunFleet(StudyContext& context, bool see_each_other) {
   if (!see_each_other) sim_arguments.emplace_back("--unseen");
   const auto fleet = server.Start(sim_arguments);
   std::map<std::string, Stamp> joined;
+  std::optional<OccupancyImage> before_join, after_join;
   while (fleet->RunningAfter(std::chrono::milliseconds(200))) {
     const auto states = server.queries().Robots();
     if (!states) continue;
     for (const RobotStatus& robot : *states)
       if (robot.pose.localized) joined.try_emplace(robot.session.robot, robot.pose.stamp);
+    if (after_join) continue;
+    if (auto map = server.queries().MapImage(kSite)) (joined.size() < 2 ? before_join : after_join) = *std::move(map);
   }
   const json sim = PrintedBy(fleet->Wait(LiveServer::kDeadline));
   std::vector<Job> jobs = Must(server.queries().Jobs(kSite));
@@ -227,6 +230,13 @@ void RunFleet(StudyContext& context, bool see_each_other) {
   figures.Add({"server, share of a core", Percent(sim.at("watched_cpu_share")), "-"});
   report.Add(figures, "joining-" + part);
   report.Text("Smoothing job: " + smooth.message);
+  const Plot bare{.title = "before the first join, " + part, .x = plot.x, .y = plot.y};
+  if (before_join) report.AddMap(*before_join, bare, "before-the-first-join-" + part);
+  if (after_join) {
+    Plot after_plot = bare;
+    after_plot.title = "after the first join, " + part;
+    report.AddMap(*after_join, after_plot, "after-the-first-join-" + part);
+  }
   report.AddMap(Must(server.queries().MapImage(kSite)), plot, "joined-map-" + part);
   if (context.quick) return;
   report.Expect(after.all_mean_m <= kMostErrorM, "the smoothed paths are too far from the truth");

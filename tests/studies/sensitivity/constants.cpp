@@ -106,6 +106,7 @@ void AddFilter(std::vector<Constant>& all) {
   all.push_back(Of("filter: drift.rot_per_m", runs, CAIRN_FIELD(filter.back_end.drift.rot_per_m)));
   all.push_back(Of("filter: drift.rot_per_rad", runs, CAIRN_FIELD(filter.back_end.drift.rot_per_rad)));
   all.push_back(Of("filter: sample_distance_m", runs, CAIRN_FIELD(filter.fastslam.sample_distance_m)));
+  all.push_back(Share("filter: drawn_share", runs, CAIRN_FIELD(filter.fastslam.drawn_share)));
   all.push_back(Share("filter: resample_below", runs, CAIRN_FIELD(filter.fastslam.resample_below)));
   all.push_back(Of("filter: gate.distance_m", runs, CAIRN_FIELD(gate.distance_m)));
   all.push_back(Of("filter: gate.turn_rad", runs, CAIRN_FIELD(gate.turn_rad)));

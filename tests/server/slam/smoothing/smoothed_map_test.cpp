@@ -18,10 +18,10 @@ std::vector<Pose2> TruePath() {
   return path;
 }
 
-// From half way on 0.15 m beside the truth.
-std::vector<Pose2> BrokenPath() {
+// From half way on beside the truth.
+std::vector<Pose2> BrokenPath(double beside_m = 0.15) {
   std::vector<Pose2> path = TruePath();
-  for (std::size_t k = path.size() / 2; k < path.size(); ++k) path[k].x += 0.15;
+  for (std::size_t k = path.size() / 2; k < path.size(); ++k) path[k].x += beside_m;
   return path;
 }
 
@@ -100,14 +100,38 @@ TEST(SmoothedMap, IsTheBestParticlesInAnyCaseWhereTheThesisIsAskedFor) {
   EXPECT_GT(map->after.mean_m2(), map->before.mean_m2());
 }
 
-TEST(SmoothedMap, AFittedPathIsNotOverruled) {
-  MapperSnapshot snapshot = Snapshot(TruePath(), BrokenPath());
-  const Eigen::Matrix3d tight = 1e-6 * Eigen::Matrix3d::Identity();
+// The path online, its steps, and this many loops, all alike, that say that it is the other one.
+MapperSnapshot SnapshotWithLoops(const std::vector<Pose2>& online, const std::vector<Pose2>& other, int loops) {
+  MapperSnapshot snapshot = Snapshot(online, online);
+  const Eigen::Matrix3d loose = 1e-3 * Eigen::Matrix3d::Identity(), tight = 1e-6 * Eigen::Matrix3d::Identity();
   for (std::size_t k = 1; k < kLooks; ++k)
-    snapshot.relations.push_back({k - 1, k, Between(BrokenPath()[k - 1], BrokenPath()[k]), tight, false});
-  const auto map = SmoothMap(snapshot, {}, kGoOn);
+    snapshot.relations.push_back({k - 1, k, Between(online[k - 1], online[k]), loose, false});
+  for (int i = 0; i < loops; ++i)
+    snapshot.relations.push_back({0, kLooks - 1, Between(other.front(), other.back()), tight, true});
+  return snapshot;
+}
+
+// One place seen again, half a metre beside where it is: nothing but the scans contradicts it.
+TEST(SmoothedMap, AWrongLoopWithFewOthersDoesNotBendThePath) {
+  const MapperSnapshot snapshot = SnapshotWithLoops(TruePath(), BrokenPath(0.5), 1);
+  ASSERT_GT(std::abs(SmoothedPath(snapshot).back().x - TruePath().back().x), 0.4);
+  int asked = 0;
+  const auto map = SmoothMap(snapshot, {}, [&asked] { return ++asked > 0; });
   ASSERT_TRUE(map);
-  EXPECT_NEAR(map->path.back().x, BrokenPath().back().x, 1e-6);
+  EXPECT_TRUE(map->path == TruePath());
+  EXPECT_LE(asked, static_cast<int>(SmoothingSteps(snapshot)));
+}
+
+TEST(SmoothedMap, ARightLoopIsTakenWhereItIsTheOnlyOne) {
+  const auto map = SmoothMap(SnapshotWithLoops(BrokenPath(), TruePath(), 1), {}, kGoOn);
+  ASSERT_TRUE(map);
+  EXPECT_NEAR(map->path.back().x, TruePath().back().x, 0.01);
+}
+
+TEST(SmoothedMap, APathFittedToManyLoopsIsNotOverruled) {
+  const auto map = SmoothMap(SnapshotWithLoops(TruePath(), BrokenPath(0.5), 11), {}, kGoOn);
+  ASSERT_TRUE(map);
+  EXPECT_NEAR(map->path.back().x, BrokenPath(0.5).back().x, 0.01);
 }
 
 TEST(SmoothedMap, EndsAtOnceWhenToldTo) {
