@@ -196,6 +196,7 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   }
   const Eigen::Matrix3d prior_information = guess.prior_covariance.llt().solve(Eigen::Matrix3d::Identity());
   const double per_point = 1.0 / (options.residual_sigma_m * options.residual_sigma_m);
+  const double least_inliers = guess.least_score * static_cast<double>(points_robot.size());
   std::vector<PointIndex::Found> found(points_robot.size());
   Pose2 T = guess.T_ref_robot_start;
   Linearisation sum;
@@ -206,6 +207,10 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
         options.first_pair_distance_m + shrink * (options.last_pair_distance_m - options.first_pair_distance_m);
     sum = Linearise(points_robot, reference, T, gate, options, found);
     if (sum.pairs < 5) break;
+    if (iteration >= guess.settling && sum.inliers < least_inliers) {
+      result.failure = MatchFailure::kNotConverged;
+      return result;
+    }
     const Eigen::Vector3d from_prior = Minus(T, guess.T_ref_robot_prior);
     const Eigen::Matrix3d H = per_point * sum.H.matrix() + prior_information;
     const Eigen::Vector3d step = -H.ldlt().solve(per_point * sum.g + prior_information * from_prior);

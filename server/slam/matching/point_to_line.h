@@ -56,6 +56,10 @@ struct AlignmentGuess {
   Pose2 T_ref_robot_start;
   Pose2 T_ref_robot_prior;
   Eigen::Matrix3d prior_covariance;  // Covariance of (x, y, theta) of the prior, along the axes of `ref`.
+  // Where a smaller share of the points is explained after the first `settling` iterations, the caller has no use for
+  // the result. The iteration is given up then, and has not converged.
+  double least_score = 0.0;
+  int settling = 0;
 };
 
 // T_ref_curr of the result is T_ref_robot; it is the prior if the iteration did not converge.

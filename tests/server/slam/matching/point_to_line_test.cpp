@@ -47,6 +47,38 @@ TEST(PointToLine, FindsTheWayBackFromSeveralStartingErrors) {
   }
 }
 
+// Seen from elsewhere: the scan has little in common with the reference.
+TEST(PointToLine, IsGivenUpWhereTooLittleIsExplainedToBeOfUse) {
+  const Laser laser{.beams = 361, .step_rad = Radians(0.5)};
+  const PointIndex reference = ReferenceOf(test::Office(), laser);
+  const Pose2 guess{0.1, 0.05, 0.02};
+  const std::vector<SurfacePoint> elsewhere = SurfaceOf(Look(test::Office(), {1.5, 1.0, 2.0}, laser));
+  const MatchResult to_the_end = AlignPointsToSurfaces(elsewhere, reference, {guess, guess, kPrior}, {});
+  ASSERT_LT(to_the_end.score, 0.6);
+  ASSERT_GT(to_the_end.iterations, 3);
+  const MatchResult given_up = AlignPointsToSurfaces(elsewhere, reference, {guess, guess, kPrior, 0.7, 2}, {});
+  EXPECT_FALSE(given_up.converged);
+  EXPECT_EQ(given_up.failure, MatchFailure::kNotConverged);
+  EXPECT_EQ(given_up.iterations, 2);
+  EXPECT_EQ(given_up.T_ref_curr, guess);
+  EXPECT_EQ(given_up.covariance, kPrior);
+}
+
+TEST(PointToLine, IsTheSameWhereEnoughIsExplained) {
+  const Laser laser{.beams = 361, .step_rad = Radians(0.5)};
+  const PointIndex reference = ReferenceOf(test::Office(), laser);
+  const std::vector<SurfacePoint> points = SurfaceOf(Look(test::Office(), {0.12, -0.08, 0.06}, laser));
+  // At first few points are explained, because the start is far off: that is not judged yet.
+  const Pose2 guess{0.35, 0.1, 0.2};
+  const MatchResult match = AlignPointsToSurfaces(points, reference, {guess, guess, kPrior}, {});
+  ASSERT_TRUE(match.converged);
+  const MatchResult same = AlignPointsToSurfaces(points, reference, {guess, guess, kPrior, 0.55, 2}, {});
+  EXPECT_TRUE(same.converged);
+  EXPECT_EQ(same.T_ref_curr, match.T_ref_curr);
+  EXPECT_EQ(same.covariance, match.covariance);
+  EXPECT_EQ(same.iterations, match.iterations);
+}
+
 // The plain form: every search looks at all reference points, and the equations are written as matrices.
 struct Plain {
   const std::vector<SurfacePoint>& points;
