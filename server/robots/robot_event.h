@@ -31,7 +31,7 @@ struct SessionMaterial {
   // map version has joined it (maps/robot_grid.h).
   bool start_known = true;
   bool start_found = false;  // It is known only because a map version has joined it.
-  bool joinable = true;  // See SessionRecord::Joining.
+  bool joinable = true;      // See SessionRecord::Joining.
   slam::Mapper::LostView lost{};
   // With which the session itself would make the map of a PlaceSuggested ready for use (KnownGridOf).
   slam::PlaceSearchOptions place_search{};

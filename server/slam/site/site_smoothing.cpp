@@ -251,7 +251,7 @@ class Smoothing {
     std::vector<SessionRelation> all;
     for (const auto& [a, b] : across) {
       if (!graph_.Together(a, b)) continue;
-      const auto found = SearchNearby(a, b, TiesOf(a, b), aside);
+      const auto found = SearchNearby(a, b, TiesOf(a, b), &aside);
       if (!go_on_(done_)) return std::nullopt;
       all.insert(all.end(), found.begin(), found.end());
     }
@@ -259,8 +259,7 @@ class Smoothing {
     graph_.Add(all);
     if (!SolveAndWithdraw()) return std::nullopt;
     std::size_t squares = 0;
-    for (const auto& [a, b] : across)
-      if (RelationsBetween(a, b) > 0) squares += IsTrusted(a, b) ? ExplainedSquares(graph_, a, b) : 0;
+    for (const auto& [a, b] : across) squares += IsTrusted(a, b) ? ExplainedSquares(graph_, a, b) : 0;
     const double contradicts = ContradictingShare(across);
     const double enough = contradicts < kMuchLess * contradicting ? 1.0 : kOutvotes;
     if (graph_.Together(pair.a, pair.b) && contradicts <= contradicting + kMoreContradicting &&
@@ -340,13 +339,11 @@ class Smoothing {
     return path;
   }
 
-  [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties) {
-    return SearchNearby(a, b, ties, book_);
-  }
-
+  // `aside`: a book for what is not to be noted in that of the site.
   [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties,
-                                                          RelationBook& book) const {
+                                                          RelationBook* aside = nullptr) {
     const PosePath path_a = PathOf(a), path_b = PathOf(b);
+    RelationBook& book = aside == nullptr ? book_ : *aside;
     return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book);
   }
 
