@@ -37,6 +37,7 @@ class Decision {
 };
 
 constexpr double kShareOfJoining = 0.5;  // Of the progress.
+constexpr double kWrongPlaceM = 5.0;
 
 // Nothing: cancelled.
 std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vector<SessionMaterial>& material,
@@ -46,7 +47,7 @@ std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vect
   std::vector<slam::SiteSession> sessions;
   sessions.reserve(material.size());
   for (const SessionMaterial& session : material)
-    sessions.push_back({session.snapshot, session.start_known, session.session});
+    sessions.push_back({session.snapshot, session.start_known, session.session, session.start_found});
   const auto go_on = [&control](double share) {
     control.Progress(kShareOfJoining * share);
     return !control.cancelled();
@@ -110,6 +111,18 @@ std::string Joins(const std::vector<SessionMaterial>& material, const std::vecto
          part("not joined", alone, apart);
 }
 
+// How far the session goes that was joined farthest from where it is now known to be.
+double FarthestFromPlace(const std::vector<SessionMaterial>& material,
+                         const std::vector<slam::SmoothedSession>& joint) {
+  double farthest_m = 0.0;
+  for (std::size_t i = 0; i < material.size(); ++i) {
+    if (!material[i].start_found || !joint[i].joined || !material[joint[i].frame].start_known) continue;
+    const Eigen::Vector2d before = material[i].snapshot.online_path.front().translation();
+    farthest_m = std::max(farthest_m, (joint[i].path.front().translation() - before).norm());
+  }
+  return farthest_m;
+}
+
 std::string Moves(const Alignment& alignment) {
   return "; moved by up to " + std::to_string(std::lround(100.0 * alignment.moved_m)) +
          " cm, so that scans are off the maps of others by " +
@@ -148,12 +161,16 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   if (job.kind == JobKind::kJoin && !JoinsAny(material, shown)) {
     const auto alignment = align ? AlignmentOf(material, joint, go_on) : Alignment{};
     if (!alignment) return Fail(StatusCode::kCancelled, "cancelled");
-    smoothed.aligns = alignment->IsBetter();
+    // No path is off by so much: it was joined at a wrong place. There, its map need not have been any worse.
+    const double elsewhere_m = align ? FarthestFromPlace(material, joint) : 0.0;
+    const bool was_wrong = elsewhere_m > kWrongPlaceM;
+    smoothed.aligns = alignment->IsBetter() || was_wrong;
     if (!smoothed.aligns) {
       smoothed.outcome.message = "nothing to join yet: " + summary;
       return smoothed;
     }
     summary += Moves(*alignment);
+    if (was_wrong) summary += "; a robot was joined " + std::to_string(std::lround(elsewhere_m)) + " m from its place";
   }
   // The rest of the progress is the share of scans drawn and compared.
   const double begun = together ? kShareOfJoining : 0.0;

@@ -4,11 +4,12 @@
 // start was unknown or wrong moves to where the others have seen the same. The result is published as a new map
 // version, which is disabled at first. A robot whose place in the map is not known and that is not joined with one
 // whose place is known stays a fragment in the new version (maps/robot_grid.h). A job of the kind kJoin makes no
-// version unless it joins a fragment, or fits robots that said where they start better to each other (alignment.h; only
-// where no person has chosen the enabled version, and no other job of the site waits that may change its map). Source:
-// thesis A 5.4 (full-SLAM path of the best particle). Thread rule: runs on one thread of the job worker. It waits for
-// the sessions and for the site, at most jobs.snapshot_timeout_s each, and for a switch of versions that has begun
-// until it is complete; no other thread waits for it.
+// version unless it joins a fragment, fits robots that said where they start better to each other (alignment.h), or
+// finds that one was joined at a wrong place (both only where no person has chosen the enabled version, and no other
+// job of the site waits that may change its map). Source: thesis A 5.4 (full-SLAM path of the best particle). Thread
+// rule: runs on one thread of the job worker. It waits for the sessions and for the site, at most
+// jobs.snapshot_timeout_s each, and for a switch of versions that has begun until it is complete; no other thread waits
+// for it.
 #pragma once
 
 #include <cstdint>

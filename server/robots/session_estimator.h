@@ -155,6 +155,7 @@ class SessionEstimator {
   const SessionOutputs outputs_;
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
+  const bool began_as_fragment_;
   bool fragment_ = false;
   const slam::MapperOptions options_;
   const std::shared_ptr<SharedKnownGrids> known_grids_;

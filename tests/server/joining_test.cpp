@@ -5,94 +5,42 @@
 #include <chrono>
 #include <map>
 #include <optional>
-#include <random>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "tests/eventually.h"
 #include "tests/server/slam/ring_world.h"
 #include "tests/server/support/stored_server.h"
+#include "tests/server/support/walled_robot.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
 namespace {
 
-constexpr ClientId kOther = 8;
-
-ServerOptions JoiningOptions(bool join) {
-  ServerOptions options = TestOptions();
-  options.jobs.join = join;
-  options.jobs.join_way_m = 15.0;
-  options.robots.checkpoint_entries = 50;  // So that a restart begins with one.
-  return options;
-}
-
-// A robot on its way round a ring of corridors, anticlockwise, from some place on. Its odometry begins at the origin
-// there, and turns a little too far with every metre.
-class RingRobot {
+// A robot on its way round a ring of corridors, anticlockwise, from some place on.
+class RingRobot : public WalledRobot {
  public:
-  RingRobot(std::string name, ClientId client, double from_m, double metres)
-      : name_(std::move(name)), client_(client), engine_(client) {
-    for (const Pose2& step : slam::test::RingSteps(from_m, kStepM)) T_ring_robot_ = T_ring_robot_ * step;
-    const std::size_t before = slam::test::RingSteps(from_m, kStepM).size();
-    steps_ = slam::test::RingSteps(from_m + metres, kStepM);
-    steps_.erase(steps_.begin(), steps_.begin() + static_cast<std::ptrdiff_t>(before));
-  }
-
-  void Open(WholeServer& house) const { house.Open(name_, client_, "lab", std::nullopt); }
-  void SayStarted(WholeServer& house) const { testing::SayStarted(house, name_, client_); }
-  void Drive(WholeServer& house, std::size_t count) {
-    const slam::test::Laser laser{.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01};
-    for (; count > 0 && next_ < steps_.size(); --count, ++next_) {
-      const Pose2& step = steps_[next_];
-      T_ring_robot_ = T_ring_robot_ * step;
-      T_odom_robot_ = T_odom_robot_ * step * Pose2{0.0, 0.0, 0.0002 * step.translation().norm()};
-      Scan scan = slam::test::Look(World(), T_ring_robot_, laser, &engine_);
-      scan.sequence = ++sequence_;
-      scan.stamp = static_cast<Stamp>(sequence_) * 200'000'000;
-      house.SendOdometry(name_, client_, {sequence_, scan.stamp, T_odom_robot_});
-      house.SendScan(name_, client_, std::move(scan));
-      if (sequence_ % 16 == 0) WaitSettled(house, sequence_);
-    }
-    // The last scan waits for the odometry after it.
-    WaitSettled(house, sequence_ - 1);
-  }
-  [[nodiscard]] std::size_t left() const { return steps_.size() - next_; }
-  // The distance between a pose of the last step and the truth, in the frame of a robot that began at the beginning of
-  // the ring.
-  [[nodiscard]] double Error(const PoseReport& pose) const {
-    return (pose.T_map_robot.translation() - T_ring_robot_.translation()).norm();
-  }
-  [[nodiscard]] PoseReport LastPose(const WholeServer& house) const {
-    PoseReport last;
-    for (const PoseReport& pose : house.All<PoseReport>()) {
-      if (pose.robot == name_) last = pose;
-    }
-    return last;
-  }
+  RingRobot(const std::string& name, ClientId client, double from_m, double metres)
+      : WalledRobot(name, client, World(), kLaser, StartAt(from_m), StepsFrom(from_m, metres)) {}
 
  private:
-  // Of this session, not of an earlier one of the robot.
-  void WaitSettled(const WholeServer& house, std::uint64_t sequence) const {
-    ASSERT_TRUE(house.WaitFor([&] {
-      const Ledger ledger = house.LastLedger(name_);
-      return ledger.session == client_ && ledger.settled_through >= sequence;
-    })) << sequence;
-  }
   static constexpr double kStepM = 0.2;
+  static constexpr slam::test::Laser kLaser{.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01};
   static const slam::test::World& World() {
     static const slam::test::World world = slam::test::RingCorridor(true);
     return world;
   }
-
-  const std::string name_;
-  const ClientId client_;
-  std::mt19937_64 engine_;
-  std::vector<Pose2> steps_;
-  std::size_t next_ = 0;
-  std::uint64_t sequence_ = 0;
-  Pose2 T_ring_robot_, T_odom_robot_;
+  static Pose2 StartAt(double from_m) {
+    Pose2 start;
+    for (const Pose2& step : slam::test::RingSteps(from_m, kStepM)) start = start * step;
+    return start;
+  }
+  static std::vector<Pose2> StepsFrom(double from_m, double metres) {
+    const std::size_t before = slam::test::RingSteps(from_m, kStepM).size();
+    std::vector<Pose2> steps = slam::test::RingSteps(from_m + metres, kStepM);
+    steps.erase(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(before));
+    return steps;
+  }
 };
 
 RingRobot FirstRobot() {
@@ -100,20 +48,6 @@ RingRobot FirstRobot() {
 }
 RingRobot SecondRobot() {
   return {"r2", kOther, 16.0, 50.0};
-}
-
-MapInfo InfoOf(WholeServer& house) {
-  const Reply reply = house.Ask(About(RequestKind::kMapInfo));
-  return reply.maps.empty() ? MapInfo{} : reply.maps[0];
-}
-
-// The last of the jobs that have joined robots; nothing: there is none.
-std::optional<Job> JoinedBy(const WholeServer& house) {
-  std::optional<Job> last;
-  for (const Job& job : house.All<Job>()) {
-    if (job.kind == JobKind::kJoin && job.state == JobState::kSucceeded && job.map_version > 0) last = job;
-  }
-  return last;
 }
 
 Reply Enable(WholeServer& house, std::uint32_t version) {

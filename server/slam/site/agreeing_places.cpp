@@ -85,6 +85,53 @@ bool IsProof(const std::vector<Recognised>& places, std::size_t least) {
   return in_a.high_m - in_a.low_m >= kMinCoveredM && in_b.high_m - in_b.low_m >= kMinCoveredM;
 }
 
+// The places of two sessions that were recognised in each other so far.
+class PlacesOfBoth {
+ public:
+  PlacesOfBoth(std::size_t a, SessionMap& map_a, std::size_t b, SessionMap& map_b, const LoopOptions& options,
+               RelationBook& book, const IsRival& counts = {})
+      : a_(a), b_(b), map_a_(map_a), map_b_(map_b), options_(options), book_(book), counts_(counts) {}
+
+  // Looks for the place around a keyframe of `b` in `a`.
+  void LookForB(std::size_t keyframe) {
+    if (const auto place = RecognisePlace(a_, map_a_, b_, map_b_, keyframe, options_, book_))
+      Add(InBoth(*place, map_a_, map_b_, FirstOfPlace(map_b_, keyframe)));
+  }
+  void LookForA(std::size_t keyframe) {
+    const auto place = RecognisePlace(b_, map_b_, a_, map_a_, keyframe, options_, book_);
+    if (!place) return;
+    Recognised both = InBoth(*place, map_b_, map_a_, FirstOfPlace(map_a_, keyframe));
+    std::swap(both.in_a, both.in_b);
+    both.relation = Reversed(*place);
+    Add(std::move(both));
+  }
+  [[nodiscard]] bool none() const { return all_.empty(); }
+  [[nodiscard]] bool AreProof(std::size_t least) const { return IsProof(agreeing_, least); }
+  // Of the largest set that agrees.
+  [[nodiscard]] std::vector<SessionRelation> Relations() const {
+    std::vector<SessionRelation> relations;
+    relations.reserve(agreeing_.size());
+    for (const Recognised& one : agreeing_) relations.push_back(one.relation);
+    return relations;
+  }
+
+ private:
+  void Add(Recognised place) {
+    if (counts_ && !counts_(place.relation)) return;
+    all_.push_back(std::move(place));
+    agreeing_ = LargestAgreeing(all_, map_a_, map_b_, options_);
+  }
+
+  const std::size_t a_, b_;
+  SessionMap& map_a_;
+  SessionMap& map_b_;
+  const LoopOptions& options_;
+  RelationBook& book_;
+  const IsRival counts_;  // Empty: all do.
+  std::vector<Recognised> all_;
+  std::vector<Recognised> agreeing_;
+};
+
 }  // namespace
 
 std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, std::size_t b, SessionMap& map_b,
@@ -95,36 +142,36 @@ std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, st
     std::ranges::reverse(of_a);
     std::ranges::reverse(of_b);
   }
-  std::vector<Recognised> all;
-  std::vector<Recognised> agreeing;
-  const auto add = [&](Recognised place) {
-    all.push_back(std::move(place));
-    agreeing = LargestAgreeing(all, map_a, map_b, options);
-  };
-  const auto relations = [&agreeing] {
-    std::vector<SessionRelation> relations_of_all;
-    relations_of_all.reserve(agreeing.size());
-    for (const Recognised& one : agreeing) relations_of_all.push_back(one.relation);
-    return relations_of_all;
-  };
+  PlacesOfBoth places(a, map_a, b, map_b, options, book);
   for (std::size_t pass = 0; pass < kPasses.size(); ++pass) {
-    if (soon_again && pass == kFirstPasses && all.empty()) return {};
+    if (soon_again && pass == kFirstPasses && places.none()) return {};
     for (std::size_t i = kPasses[pass]; i < std::max(of_a.size(), of_b.size()); i += kPasses.size()) {
-      if (IsProof(agreeing, kEnoughPlaces)) return relations();
+      if (places.AreProof(kEnoughPlaces)) return places.Relations();
       if (!go_on()) return {};
-      if (i < of_b.size())
-        if (const auto place = RecognisePlace(a, map_a, b, map_b, of_b[i], options, book))
-          add(InBoth(*place, map_a, map_b, FirstOfPlace(map_b, of_b[i])));
+      if (i < of_b.size()) places.LookForB(of_b[i]);
       if (i >= of_a.size() || !go_on()) continue;
-      if (const auto place = RecognisePlace(b, map_b, a, map_a, of_a[i], options, book)) {
-        Recognised both = InBoth(*place, map_b, map_a, FirstOfPlace(map_a, of_a[i]));
-        std::swap(both.in_a, both.in_b);
-        both.relation = Reversed(*place);
-        add(std::move(both));
-      }
+      places.LookForA(of_a[i]);
     }
   }
-  return IsProof(agreeing, kMinPlaces) ? relations() : std::vector<SessionRelation>{};
+  return places.AreProof(kMinPlaces) ? places.Relations() : std::vector<SessionRelation>{};
+}
+
+std::vector<SessionRelation> RivalPlaces(std::size_t a, SessionMap& map_a, std::size_t b, SessionMap& map_b,
+                                         const SoughtRivals& sought, const LoopOptions& options, const GoOn& go_on,
+                                         RelationBook& book) {
+  PlacesOfBoth rivals(a, map_a, b, map_b, options, book, sought.is_rival);
+  const std::size_t before = book.measured();
+  const auto goes_on = [&] {
+    return go_on() && book.measured() - before < (rivals.none() ? sought.most_until_first : sought.most);
+  };
+  for (const std::size_t pass : kPasses) {
+    for (std::size_t i = pass; i < std::max(sought.of_a.size(), sought.of_b.size()); i += kPasses.size()) {
+      if (rivals.AreProof(kEnoughPlaces)) return rivals.Relations();
+      if (i < sought.of_b.size() && goes_on()) rivals.LookForB(sought.of_b[i]);
+      if (i < sought.of_a.size() && goes_on()) rivals.LookForA(sought.of_a[i]);
+    }
+  }
+  return rivals.AreProof(kMinPlaces) ? rivals.Relations() : std::vector<SessionRelation>{};
 }
 
 }  // namespace cairn::slam

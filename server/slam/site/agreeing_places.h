@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "server/slam/site/relation_search.h"
@@ -16,5 +17,21 @@ namespace cairn::slam {
 [[nodiscard]] std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, std::size_t b,
                                                           SessionMap& map_b, const LoopOptions& options,
                                                           bool soon_again, const GoOn& go_on, RelationBook& book);
+
+// Whether a relation from `a` to `b` contradicts how the two sessions lie.
+using IsRival = std::function<bool(const SessionRelation& place)>;
+
+struct SoughtRivals {
+  std::vector<std::size_t> of_a, of_b;  // Keyframes around which the places are, in the order of the search.
+  IsRival is_rival;
+  // So many searches that the book does not know already, until the first rival is found, and altogether.
+  std::size_t most_until_first = 0, most = 0;
+};
+
+// As AgreeingPlaces, for two sessions that lie together: relations that agree with each other that they lie otherwise.
+[[nodiscard]] std::vector<SessionRelation> RivalPlaces(std::size_t a, SessionMap& map_a, std::size_t b,
+                                                       SessionMap& map_b, const SoughtRivals& sought,
+                                                       const LoopOptions& options, const GoOn& go_on,
+                                                       RelationBook& book);
 
 }  // namespace cairn::slam

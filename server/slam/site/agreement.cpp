@@ -10,6 +10,8 @@ namespace {
 constexpr double kEveryM = 1.0;   // Way between two comparisons.
 constexpr int kMinCompared = 20;  // Points.
 constexpr double kBadShare = 1.0 / 3.0;
+constexpr double kMaxContradicting = 0.10;  // Share of what both have seen that may contradict, ...
+constexpr double kMaxBadPlaces = 0.15;      // ... and of places where much contradicts.
 
 // The keyframe of `map` that shows most of what is seen from this pose.
 std::optional<std::size_t> NearestOf(const PlacedSession& session, const Pose2& T_site_robot) {
@@ -27,6 +29,11 @@ std::optional<std::size_t> NearestOf(const PlacedSession& session, const Pose2& 
 }
 
 }  // namespace
+
+bool Contradicts(const SessionAgreement& agreement) {
+  return agreement.counts.contradicted > kMaxContradicting * agreement.counts.known() ||
+         static_cast<double>(agreement.contradicting) > kMaxBadPlaces * static_cast<double>(agreement.places);
+}
 
 SessionAgreement AgreementOf(const PlacedSession& a, const PlacedSession& b, const SiteOptions& options) {
   SessionAgreement agreement;

@@ -16,6 +16,9 @@ struct SessionAgreement {
   std::size_t contradicting = 0;  // Those of them where more than a third contradicts.
 };
 
+// Whether two sessions cannot lie so.
+[[nodiscard]] bool Contradicts(const SessionAgreement& agreement);
+
 [[nodiscard]] SessionAgreement AgreementOf(const PlacedSession& a, const PlacedSession& b, const SiteOptions& options);
 
 }  // namespace cairn::slam

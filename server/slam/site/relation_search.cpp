@@ -12,6 +12,7 @@
 #include "server/slam/loops/unique_pose.h"
 #include "server/slam/loops/visibility.h"
 #include "server/slam/matching/point_index.h"
+#include "server/slam/site/ties.h"
 
 namespace cairn::slam {
 namespace {
@@ -84,11 +85,7 @@ class NearbySearch {
 
   // The way from the nearest tie to the two keyframes, along both sessions.
   [[nodiscard]] double WayFromTie(std::size_t known, std::size_t seen) const {
-    double least = std::numeric_limits<double>::infinity();
-    for (const Tie& tie : ties_)
-      least = std::min(least, std::abs(known_.map.travelled_m(tie.known) - known_.map.travelled_m(known)) +
-                                  std::abs(seen_.map.travelled_m(tie.seen) - seen_.map.travelled_m(seen)));
-    return least;
+    return slam::WayFromTie(ties_, known_.map, known, seen_.map, seen);
   }
 
   [[nodiscard]] std::optional<SessionRelation> Revisit(std::size_t seen) {

@@ -5,29 +5,41 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "server/slam/site/agreeing_places.h"
 #include "server/slam/site/agreement.h"
+#include "server/slam/site/believed_relations.h"
+#include "server/slam/site/rival_places.h"
 #include "server/slam/site/site_graph.h"
+#include "server/slam/site/ties.h"
 #include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr double kTieEveryM = 3.0;          // Way between two ties.
-constexpr std::size_t kMinRelations = 3;    // Two sessions are not related by fewer.
-constexpr double kMaxContradicting = 0.10;  // Share of what both have seen that may contradict, ...
-constexpr double kMaxBadPlaces = 0.15;      // ... and of places where much contradicts.
+constexpr std::size_t kMinRelations = 3;  // Two sessions are not related by fewer.
 constexpr std::size_t kMinComparedPlaces = 5;
-constexpr int kRounds = 3;            // Searches near the paths, each along the paths of the last one.
+constexpr int kRounds = 3;                  // Searches near the paths, each along the paths of the last one.
+constexpr std::size_t kRivalSearches = 24;  // Of one job.
+// A session is moved away from where it was joined if so many times as much is explained then, or simply more where
+// less than half as much contradicts it; but never where more contradicts it.
+constexpr double kOutvotes = 1.25, kMuchLess = 0.5, kMoreContradicting = 0.002;
 constexpr double kEnoughMore = 1.02;  // No further search if the last one found no more than this ratio.
 
 class Smoothing {
  public:
-  Smoothing(std::deque<SessionMap>& maps, SiteGraph graph, const SiteOptions& options, SiteSearch search,
-            const std::function<bool(double)>& go_on, RelationBook& book)
-      : maps_(maps), graph_(std::move(graph)), options_(options), search_(search), go_on_(go_on), book_(book) {}
+  // `told`: for each session, whether its place is known, and no job has found it.
+  Smoothing(std::deque<SessionMap>& maps, SiteGraph graph, std::vector<bool> told, const SiteOptions& options,
+            SiteSearch search, const std::function<bool(double)>& go_on, RelationBook& book)
+      : maps_(maps),
+        graph_(std::move(graph)),
+        told_(std::move(told)),
+        options_(options),
+        search_(search),
+        go_on_(go_on),
+        book_(book) {}
 
   // False: cancelled.
   bool Run() {
@@ -40,7 +52,7 @@ class Smoothing {
     if (!BeginWithBelieved()) return false;
     // A fragment drives on as long as the job takes; to measure the rest can wait until the next job.
     if (joins && FitsAllTogether()) {
-      NoteBelieved();
+      NoteAllBelieved();
       return true;
     }
     if (!JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
@@ -50,7 +62,8 @@ class Smoothing {
       began_with_ = 0;
       if ((!all && !JoinByPlaces()) || !JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
     }
-    NoteBelieved();
+    if (began_with_ > 0 && search_ != SiteSearch::kFragments && !LookForRivals()) return false;
+    NoteAllBelieved();
     return true;
   }
 
@@ -96,21 +109,12 @@ class Smoothing {
     return pairs;
   }
 
-  [[nodiscard]] RelationBook::Pair InBook(const Pair& pair) const {
-    return {maps_[pair.a].session(), maps_[pair.b].session()};
-  }
-
-  // The relations that the last job believed, as far as their keyframes are still there, take the place of the first
-  // search.
+  // The relations that the last job believed take the place of the first search.
   bool BeginWithBelieved() {
     std::vector<SessionRelation> all;
     for (const Pair& pair : Pairs()) {
       if (RelationsBetween(pair.a, pair.b) > 0) continue;
-      std::vector<SessionRelation> believed;
-      book_.ForEachBelieved(InBook(pair), [&](const Measurement& one) {
-        const auto known = maps_[pair.a].IndexOf(one.known), seen = maps_[pair.b].IndexOf(one.seen);
-        if (known && seen) believed.push_back({{pair.a, *known}, {pair.b, *seen}, one.T_known_seen, one.covariance});
-      });
+      const auto believed = BelievedBetween(graph_, pair.a, pair.b, book_);
       if (believed.size() >= kMinRelations) all.insert(all.end(), believed.begin(), believed.end());
     }
     began_with_ = all.size();
@@ -120,25 +124,15 @@ class Smoothing {
     return graph_.BeginWithLastPaths(book_) || SolveAndWithdraw();
   }
 
-  void NoteBelieved() {
-    for (const Pair& pair : Pairs()) {
-      std::map<std::uint64_t, const SessionRelation*> by_seen;
-      for (const SessionRelation& one : graph_.relations())
-        if (one.from.session == pair.a && one.to.session == pair.b)
-          by_seen[maps_[pair.b].id(one.to.keyframe).number] = &one;
-      book_.SetBelieved(InBook(pair), [&](const Measurement& one) {
-        const auto relation = by_seen.find(one.seen.number);
-        return relation != by_seen.end() && maps_[pair.a].id(relation->second->from.keyframe) == one.known &&
-               relation->second->T_from_to == one.T_known_seen;
-      });
-    }
+  void NoteAllBelieved() {
+    for (const Pair& pair : Pairs()) NoteBelieved(graph_, pair.a, pair.b, book_);
     graph_.NotePaths(book_);
   }
 
   // Some of it may be done twice.
   void Done(double share) { done_ = std::max(done_, share); }
 
-  [[nodiscard]] GoOn Asked() {
+  [[nodiscard]] GoOn Asked() const {
     return [this] { return go_on_(done_); };
   }
 
@@ -222,6 +216,67 @@ class Smoothing {
     return true;
   }
 
+  // Sessions that jobs have joined may lie at a wrong place (rival_places.h).
+  bool LookForRivals() {
+    bool moved = false;
+    std::size_t searches = kRivalSearches;
+    for (const Pair& pair : Pairs()) {
+      if (!graph_.Together(pair.a, pair.b) || (told_[pair.a] && told_[pair.b])) continue;
+      const std::size_t before = book_.measured();
+      const auto rivals = RivalsOf(graph_, maps_, pair.a, pair.b, searches, options_.loop, Asked(), book_);
+      if (!go_on_(done_)) return false;
+      searches -= std::min(searches, book_.measured() - before);
+      if (rivals.empty()) continue;
+      const auto outvote = OutvotePresent(pair, rivals);
+      if (!outvote) return false;
+      moved = moved || *outvote;
+    }
+    for (SessionMap& map : maps_) map.ForgetPlaces();
+    return !moved || Refine();
+  }
+
+  // Moves what has to be moved so that two sessions lie as these relations between them say, if this explains more than
+  // how they lie now, and nothing contradicts it. Whether it did so; nothing: cancelled.
+  std::optional<bool> OutvotePresent(const Pair& pair, std::span<const SessionRelation> rivals) {
+    const WeakestCut cut = WeakestCutBetween(graph_, pair.a, pair.b, told_);
+    std::vector<Pair> across = Pairs();
+    std::erase_if(across, [&cut](const Pair& one) { return cut.moves[one.a] == cut.moves[one.b]; });
+    const double contradicting = ContradictingShare(across);
+    const SiteGraph before = graph_;
+    for (const auto& [a, b] : across) graph_.RemoveBetween(a, b);
+    if (!Solve()) return std::nullopt;
+    graph_.Add(rivals);
+    if (!SolveAndWithdraw()) return std::nullopt;
+    RelationBook aside;  // What holds now has to stay in the book if this does not.
+    std::vector<SessionRelation> all;
+    for (const auto& [a, b] : across) {
+      if (!graph_.Together(a, b)) continue;
+      const auto found = SearchNearby(a, b, TiesOf(a, b), &aside);
+      if (!go_on_(done_)) return std::nullopt;
+      all.insert(all.end(), found.begin(), found.end());
+    }
+    for (const auto& [a, b] : across) graph_.RemoveBetween(a, b);
+    graph_.Add(all);
+    if (!SolveAndWithdraw()) return std::nullopt;
+    std::size_t squares = 0;
+    for (const auto& [a, b] : across) squares += IsTrusted(a, b) ? ExplainedSquares(graph_, a, b) : 0;
+    const double contradicts = ContradictingShare(across);
+    const double enough = contradicts < kMuchLess * contradicting ? 1.0 : kOutvotes;
+    if (graph_.Together(pair.a, pair.b) && contradicts <= contradicting + kMoreContradicting &&
+        static_cast<double>(squares) > enough * static_cast<double>(cut.squares))
+      return true;
+    TakeBack(before);
+    return false;
+  }
+
+  // Of what sessions of these pairs have both seen.
+  [[nodiscard]] double ContradictingShare(std::span<const Pair> pairs) {
+    VisibilityCounts all;
+    for (const auto& [a, b] : pairs)
+      if (graph_.Together(a, b)) all += AgreementBetween(a, b).counts;
+    return all.known() == 0 ? 0.0 : static_cast<double>(all.contradicted) / all.known();
+  }
+
   // Whether no two sessions in one frame contradict each other, also those that are related through others only.
   [[nodiscard]] bool FitsAllTogether() {
     return std::ranges::all_of(Pairs(), [this](const Pair& pair) {
@@ -278,57 +333,29 @@ class Smoothing {
     return agreement.places >= kMinComparedPlaces && !Contradicts(agreement);
   }
 
-  [[nodiscard]] static bool Contradicts(const SessionAgreement& agreement) {
-    return agreement.counts.contradicted > kMaxContradicting * agreement.counts.known() ||
-           static_cast<double>(agreement.contradicting) > kMaxBadPlaces * static_cast<double>(agreement.places);
-  }
-
   [[nodiscard]] PosePath PathOf(std::size_t session) const {
     PosePath path;
     for (const Pose2& pose : graph_.path(session)) path.Append(pose);
     return path;
   }
 
-  [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties) {
+  // `aside`: a book for what is not to be noted in that of the site.
+  [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties,
+                                                          RelationBook* aside = nullptr) {
     const PosePath path_a = PathOf(a), path_b = PathOf(b);
-    return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book_);
+    RelationBook& book = aside == nullptr ? book_ : *aside;
+    return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book);
   }
 
-  // The relations between two sessions, some metres apart. Sessions that are related only through others are tied where
-  // they come nearest.
   [[nodiscard]] std::vector<Tie> TiesOf(std::size_t a, std::size_t b) const {
-    std::vector<Tie> ties;
-    const auto near = [this](std::size_t session, std::size_t x, std::size_t y) {
-      return std::abs(maps_[session].travelled_m(x) - maps_[session].travelled_m(y)) < kTieEveryM;
-    };
-    for (const SessionRelation& one : graph_.relations()) {
-      if (one.from.session != a || one.to.session != b) continue;
-      const Tie tie{one.from.keyframe, one.to.keyframe};
-      if (std::ranges::none_of(
-              ties, [&](const Tie& other) { return near(a, other.known, tie.known) && near(b, other.seen, tie.seen); }))
-        ties.push_back(tie);
-    }
-    if (!ties.empty()) return ties;
-    Tie nearest;
-    double least = std::numeric_limits<double>::infinity();
-    const PosePath path_a = PathOf(a);
-    for (std::size_t k = 0; k < maps_[b].size(); ++k) {
-      const Eigen::Vector2d here = graph_.path(b)[k].translation();
-      const double reach_m = std::min(least, options_.loop.max_doubt_m);
-      ForEachNear(path_a, path_a.size(), here, reach_m, [&](std::size_t i, const Pose2& there) {
-        const double away_m = (there.translation() - here).norm();
-        if (away_m >= least) return;
-        least = away_m;
-        nearest = {i, k};
-      });
-    }
-    return {nearest};
+    return TiesBetween(graph_, a, b, options_.loop.max_doubt_m);
   }
 
   static constexpr double kShareOfPlaces = 0.5;  // Of the work.
 
   std::deque<SessionMap>& maps_;
   SiteGraph graph_;
+  const std::vector<bool> told_;
   const SiteOptions& options_;
   const SiteSearch search_;
   const std::function<bool(double)>& go_on_;
@@ -348,16 +375,17 @@ std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteS
   RelationBook own_book;
   std::deque<SessionMap> maps;
   std::vector<const SessionMap*> known;
-  std::vector<bool> start_known;
+  std::vector<bool> start_known, told;
   for (const SiteSession& session : sessions) {
     auto own_path = SmoothedPath(session.snapshot, [&go_on] { return go_on(0.0); });
     if (!own_path) return std::nullopt;
     const std::uint64_t id = book == nullptr ? maps.size() + 1 : session.id;
     known.push_back(&maps.emplace_back(id, session.snapshot, *std::move(own_path), options));
     start_known.push_back(session.start_known);
+    told.push_back(session.start_known && !session.start_found);
   }
-  Smoothing smoothing(maps, SiteGraph(known, std::move(start_known), options.pose_graph), options, search, go_on,
-                      book == nullptr ? own_book : *book);
+  Smoothing smoothing(maps, SiteGraph(known, std::move(start_known), options.pose_graph), std::move(told), options,
+                      search, go_on, book == nullptr ? own_book : *book);
   if (options.pose_graph.enabled && !smoothing.Run()) return std::nullopt;
   std::vector<SmoothedSession> results;
   for (std::size_t s = 0; s < maps.size(); ++s) results.push_back(smoothing.ResultOf(s));

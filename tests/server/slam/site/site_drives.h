@@ -23,10 +23,10 @@ struct RobotDrive {
 };
 
 inline RobotDrive DriveThrough(const World& world, const Pose2& T_world_start, std::span<const Pose2> steps,
-                               const Pose2& T_own_start, std::uint64_t seed, double drift_rad_per_m = 0.0002) {
+                               const Pose2& T_own_start, std::uint64_t seed, double drift_rad_per_m = 0.0002,
+                               const Laser& laser = {.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01}) {
   RobotDrive drive;
   std::mt19937_64 rng(seed);
-  const Laser laser{.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01};
   Pose2 truth = T_world_start, own = T_own_start;
   const auto look = [&] {
     Scan scan = Look(world, truth, laser, &rng);
@@ -55,6 +55,14 @@ inline RobotDrive DriveRing(const World& world, double from_m, double metres, co
   Pose2 T_world_start;
   for (const Pose2& step : before) T_world_start = T_world_start * step;
   return DriveThrough(world, T_world_start, std::span(all).subspan(before.size()), T_own_start, seed);
+}
+
+// The snapshot as it was after so many keyframes.
+inline MapperSnapshot FirstOf(MapperSnapshot snapshot, std::size_t keyframes) {
+  snapshot.keyframes.resize(keyframes);
+  snapshot.online_path.resize(keyframes);
+  snapshot.full_path.resize(keyframes);
+  return snapshot;
 }
 
 // The largest distance between where two robots lie relative to each other, and where they truly do.

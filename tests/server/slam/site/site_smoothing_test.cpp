@@ -11,6 +11,7 @@ namespace {
 
 using test::DriveRing;
 using test::ErrorBetween;
+using test::FirstOf;
 using test::RingCorridor;
 using test::RobotDrive;
 
@@ -114,14 +115,6 @@ TEST_F(TwoRobots, TheWorkDoneOnlyGrows) {
   EXPECT_TRUE(std::ranges::is_sorted(Shares()));
   EXPECT_EQ(Shares().front(), 0.0);
   EXPECT_LT(Shares().back(), 1.0);
-}
-
-// The snapshot as it was after so many keyframes.
-MapperSnapshot FirstOf(MapperSnapshot snapshot, std::size_t keyframes) {
-  snapshot.keyframes.resize(keyframes);
-  snapshot.online_path.resize(keyframes);
-  snapshot.full_path.resize(keyframes);
-  return snapshot;
 }
 
 // A second job measures only what is new, and comes to the same result.
