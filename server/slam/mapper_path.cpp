@@ -1,5 +1,5 @@
-// Where a mapper's path lies by stamps, for those who keep poses that were reported before it was corrected, and how the
-// map is drawn where no scan does it (mapper.h).
+// Where a mapper's path lies by stamps, for those who keep poses that were reported before it was corrected, and how
+// the map is drawn where no scan does it (mapper.h).
 #include "server/slam/mapper_state.h"
 
 namespace cairn::slam {
