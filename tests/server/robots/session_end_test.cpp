@@ -225,21 +225,26 @@ TEST(SessionEnd, AKillAtAnyMomentOfItChangesNothing) {
   }
 }
 
-// Somebody switches the map while the robot's part of it is still being drawn again.
+// Somebody switches the map while the robot's part of it is still being drawn again: to one that a job has found, which
+// the path follows, or to an old one that says nothing of the path.
 TEST(SessionEnd, AMapThatComesBeforeTheLastIsDrawnIsTheSameAfterARestart) {
-  EndingRobot whole;
-  whole.Drive(0, kSteps);
-  const RobotGrid earlier = whole.Turned();  // From before the end.
-  whole.End();
-  ASSERT_TRUE(whole.estimator.DrawLate());
-  whole.Adopt(5, RobotGrid(earlier));
-  EXPECT_EQ(whole.record.epoch(), 5U);
-  whole.DrawToTheEnd();
-  EndingRobot after;
-  after.Restart({}, whole.given.journal, 0, whole.given.journal.size());
-  ExpectSame(whole, after);
-  const slam::MapperSnapshot drawn = whole.Snapshot();
-  EXPECT_EQ(drawn.online_path, drawn.full_path);
+  for (const bool follows : {true, false}) {
+    SCOPED_TRACE(follows);
+    EndingRobot whole;
+    whole.Drive(0, kSteps);
+    RobotGrid other = whole.Turned();  // From before the end.
+    if (!follows) other.path = nullptr;
+    whole.End();
+    ASSERT_TRUE(whole.estimator.DrawLate());
+    whole.Adopt(5, RobotGrid(other));
+    EXPECT_EQ(whole.record.epoch(), 5U);
+    whole.DrawToTheEnd();
+    EndingRobot after;
+    after.Restart({}, whole.given.journal, 0, whole.given.journal.size());
+    ExpectSame(whole, after);
+    const slam::MapperSnapshot drawn = whole.Snapshot();
+    EXPECT_EQ(drawn.online_path, drawn.full_path);
+  }
 }
 
 }  // namespace
