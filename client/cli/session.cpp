@@ -63,9 +63,9 @@ void AddSession(CLI::App& app, Program& program) {
   auto* end = session->add_subcommand("end", "End a robot's session for good: its trajectory is complete");
   auto robot = std::make_shared<std::string>();
   end->footer(
-      "The path and the map of the robot stay; the session cannot be taken up again. A new one of the same robot, such "
-      "as\n"
-      "another replay, says where the robot starts (--start), or is not joined until it has driven where others have.\n"
+      "The path of the robot is fitted to all that it has seen again, and its map is drawn along it within about a\n"
+      "second. Both stay; the session cannot be taken up again. A new one of the same robot, such as another replay,\n"
+      "says where the robot starts (--start), or is not joined until it has driven where others have.\n"
       "EXAMPLES\n  cairn session end robot1");
   end->add_option("robot", *robot, "The robot's name")->required();
   program.OnChosen(*end, robot, EndSession);

@@ -18,6 +18,7 @@ constexpr Stamp kLatest = std::numeric_limits<Stamp>::max() - kApartNs;  // A la
 
 std::vector<ScanArrival> ScanMerge::Add(ScanArrival&& scan, Clock::time_point now) {
   lidars_[scan.stream.sensor_id] = {scan.scan->stamp, now};
+  if (!first_at_) first_at_ = now;
   const Stamp stamp = scan.scan->stamp;
   held_.emplace(stamp, Held{std::move(scan), now});
   return TakeDue(now);
@@ -25,6 +26,7 @@ std::vector<ScanArrival> ScanMerge::Add(ScanArrival&& scan, Clock::time_point no
 
 std::vector<ScanArrival> ScanMerge::TakeDue(Clock::time_point now) {
   std::vector<ScanArrival> out;
+  if (WaitsForOdometry(now)) return out;
   const auto waited = [now](const auto& one) { return now - one.second.since >= kPatience; };
   while (!held_.empty() && (held_.size() > kMostHeld || MayGo(held_.begin()->second, now) ||
                             std::any_of(held_.begin(), held_.end(), waited)))
@@ -36,6 +38,13 @@ std::vector<ScanArrival> ScanMerge::TakeAll() {
   std::vector<ScanArrival> out;
   while (!held_.empty()) PassFirst(out);
   return out;
+}
+
+bool ScanMerge::WaitsForOdometry(Clock::time_point now) {
+  if (odometry_patience_ == Clock::duration{}) return false;
+  const bool waits = !first_at_ || (now - *first_at_ < odometry_patience_ && held_.size() <= most_waiting_);
+  if (!waits) OdometryCame();
+  return waits;
 }
 
 bool ScanMerge::MayGo(const Held& held, Clock::time_point now) const {

@@ -31,6 +31,9 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
               setup.estimator.map_begun},
       outputs_(std::move(outputs)),
       record_(setup.id, setup.request, options),
+      merge_(std::chrono::round<ScanMerge::Clock::duration>(
+                 std::chrono::duration<double>(setup.estimator.mapper.pairing.no_odometry_after_s)),
+             static_cast<std::size_t>(options.queue_scans)),
       queue_(static_cast<std::size_t>(options.queue_scans), static_cast<std::size_t>(options.queue_odometry)),
       strand_(asio::make_strand(pool)),
       pace_(outputs_.checkpoint_limits),
@@ -91,8 +94,9 @@ void Session::EnqueueAll() {
   Enqueue(merge_.TakeAll());
 }
 
-void Session::EnqueueDue() {
+void Session::EnqueueDue(bool odometry_came) {
   const MutexLock lock(merge_mutex_);
+  if (odometry_came) merge_.OdometryCame();
   Enqueue(merge_.TakeDue(ScanMerge::Clock::now()));
 }
 
@@ -109,7 +113,7 @@ void Session::Take(OdometryArrival&& arrival) {
     record_.OdometryDropped(merged->stream.session, merged->odometry.sequence, DropReason::kQueueFull);
     Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
   }
-  EnqueueDue();
+  EnqueueDue(true);
   Schedule();
 }
 
@@ -218,6 +222,7 @@ void Session::Replay(JournalEntry&& entry, const SessionEstimator::Switched& swi
 void Session::Replayed() {
   Throws([this] { estimator_.Replayed(); });  // Also of one that failed: what it has drawn is part of the map.
   record_.Restored(stored_.quiet_since_ms);
+  if (record_.begun()) EnqueueDue(true);  // Whether it has odometry is known.
   if (record_.phase() == SessionPhase::kEnded) ending_ = true;
   state_unsent_ = true;
 }

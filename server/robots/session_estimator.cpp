@@ -204,6 +204,7 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
 }
 
 void SessionEstimator::On(Correction&& correction) {
+  DrawToTheEnd();
   Store(CorrectionTaken{correction.epoch, correction.generation, ToStored(correction.grid)});
   Adopted adopted{
       .session = identity_.id, .displaced = DisplacedGrid(), .change = {.session = identity_.id, .chunks = {}}};
@@ -355,6 +356,7 @@ void SessionEstimator::On(Finish&& finish) {
   if (!ended_ && !goes_on) {
     if (finish.final) Store(SessionFinished{true, finish.reason});
     pipeline_.Finish();
+    if (finish.final) FitPath();
     RefreshLandmarks(true);
     ended_ = finish.final;
     if (ended_) pipeline_.mapper().ForgetSuggestion();

@@ -71,8 +71,9 @@ class SessionEstimator {
   // Settles an event without the estimator, also the one that failed: scans and odometry are counted as dropped,
   // whoever waits for an answer gets an empty one, and a correction is dropped.
   void Discard(RobotEvent&& event);
-  // Draws some of what a grid lacks that was taken over with a correction (slam::Mapper::DrawLate), and reports it.
-  // Returns whether there is more: to be called again, also where no event comes.
+  // Draws some of what a grid lacks that was taken over with a correction (slam::Mapper::DrawLate), and of the map of a
+  // session that has ended, where it is drawn again; and reports it. Returns whether there is more: to be called again,
+  // also where no event comes.
   bool DrawLate();
   // Drops the scans inside the estimator.
   void DropWaiting();
@@ -87,8 +88,7 @@ class SessionEstimator {
   [[nodiscard]] bool replaying() const { return replaying_; }
   // Saves the state after the entries so far. The result is a function that makes the content; it may take long and may
   // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save), or while DrawLate has
-  // something to do. Load restores this state;
-  // then the entries that follow are replayed.
+  // something to do. Load restores this state; then the entries that follow are replayed.
   [[nodiscard]] Journal::Content Save() const;
   // Called after each Save of which a checkpoint is made, before the next event. A place that a job has found, and that
   // the next scans have to confirm, is not part of the checkpoint, because it comes with a map. It is looked at anew
@@ -147,6 +147,10 @@ class SessionEstimator {
   // Returns false if the grid stays as it was, because the path cannot follow.
   bool AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
   void FollowPath(std::optional<bool> fragment);
+  void FitPath();
+  // The session has ended and its map is being drawn again, which no scan does any more.
+  [[nodiscard]] bool FinishesMap() const { return ended_ && pipeline_.mapper().draws_again(); }
+  void DrawToTheEnd();
   void SetEpoch(std::uint32_t epoch);
   void Drive(const Pose2& T_map_robot);
   void TellJoining();

@@ -57,9 +57,30 @@ bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   return adopted;
 }
 
+// No scan will follow. What was seen again since the last large loop has corrected the pose, but not the way to there:
+// now the path fits all of it. Called by the same entry of the journal in every server that reads it, after the same
+// samples.
+void SessionEstimator::FitPath() {
+  slam::Mapper& mapper = pipeline_.mapper();
+  const std::vector<Pose2> before = mapper.BestPath();
+  mapper.SettlePath();
+  const std::vector<Pose2> after = mapper.BestPath();
+  if (before.empty() || after == before) return;
+  record_.MoveLast(after.back() * before.back().Inverse());
+  FollowPath({});
+  if (!replaying_) outputs_.send(record_.snapshot().status.pose);
+}
+
+// What follows is the same whether it comes while the map is drawn or after a restart, which draws it at once.
+void SessionEstimator::DrawToTheEnd() {
+  while (FinishesMap()) static_cast<void>(pipeline_.mapper().DrawAgain());
+}
+
 bool SessionEstimator::DrawLate() {
-  if (!pipeline_.mapper().draws_late()) return false;
-  const bool more = pipeline_.mapper().DrawLate();
+  slam::Mapper& mapper = pipeline_.mapper();
+  const bool finishes = FinishesMap();
+  if (!finishes && !mapper.draws_late()) return false;
+  const bool more = finishes ? mapper.DrawAgain() : mapper.DrawLate();
   GridChange change = TakeGridChange();
   if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
   return more;

@@ -50,6 +50,7 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     static_cast<void>(record_.AddSensors(owner->sensors));
     static_cast<void>(record_.Resume(owner->client, owner->session));
   } else if (const auto* const correction = std::get_if<CorrectionTaken>(&entry)) {
+    DrawToTheEnd();
     // A switch that was not completed before the server ended has no effect.
     if (switched(correction->epoch, correction->generation))
       static_cast<void>(AdoptGrid(correction->epoch, FromStored(correction->grid)));
@@ -84,7 +85,7 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (switch_completed_ && !*switch_completed_) return nullptr;
-  if (pipeline_.mapper().draws_late()) return nullptr;  // It would draw them all.
+  if (pipeline_.mapper().draws_late() || FinishesMap()) return nullptr;  // It would draw them all, or never.
   // An older server of the same format would not read it, and the next scan ends this.
   if (pipeline_.odometry_has_just_begun()) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
@@ -158,6 +159,7 @@ SessionRecord::WaitingScans SessionEstimator::WaitingBySensor() const {
 
 void SessionEstimator::Replayed() {
   replaying_ = false;
+  DrawToTheEnd();
   static_cast<void>(TakeGridChange());  // The whole grid is reported instead.
   GridChange whole{.session = identity_.id, .chunks = {}, .drawn = Drawn()};
   for (const auto& [key, chunk] : pipeline_.mapper().ShareGrid()) whole.chunks.emplace_back(key, chunk);

@@ -292,11 +292,6 @@ MapperSnapshot Mapper::Snapshot() const {
           .scans = s.trail.scans()};
 }
 
-void Mapper::FinishMap() {
-  state_->SettlePath();
-  state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
-}
-
 bool Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
                        std::span<const std::uint64_t> numbers, bool must_follow, std::span<const Pose2> drawn) {
   State& s = *state_;

@@ -123,8 +123,13 @@ class Mapper {
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping, when no scan will follow. Places that were seen again since the last large loop have corrected
   // the pose at once, but not the way to there: now the path is the one that fits them all best, as a smoothing job
-  // would find it from this robot alone. Pose, landmarks and map follow. If the map is still being drawn again, draws
-  // the rest. Takes as long as a job: up to a second for thousands of keyframes.
+  // would find it from this robot alone. Pose and landmarks follow at once, and the map is drawn again along that path:
+  // DrawAgain draws some of it with each call, a few milliseconds, and returns whether there is more.
+  void SettlePath();
+  bool DrawAgain();
+  // Whether the map is being drawn again, for whatever reason. While scans come, they draw it.
+  [[nodiscard]] bool draws_again() const;
+  // Both to their end: up to a second for thousands of keyframes.
   void FinishMap();
   // Replaces the grid by the result of a finished job, drawn when there had been `keyframes` keyframes
   // (keyframes_made). `path` holds the poses of those with these `numbers` in it (none: 0, 1, 2, ...): path, particles,

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/slam/graph/loop_graph.h"
 #include "server/slam/mapper_state.h"
 
 namespace cairn::slam {
@@ -55,13 +56,13 @@ void Mapper::State::MoveTo(std::span<const Pose2> path, const Pose2& T_map_last)
 }
 
 // Places that were seen again correct the pose at once, and the way to them when the next large loop closes. No other
-// one will.
+// one will. Other robots wait for the thread of this one: so the fit is that of a large loop, which takes milliseconds.
 void Mapper::State::SettlePath() {
   const std::vector<PoseRelation> relations = trail.relations();
   if (localisation || !filter->rebases() || !filter->placed() || relations.empty()) return;
   std::vector<Pose2> path = believed_path().values();
   const Pose2 T_map_last = path.back();
-  if (!options.pose_graph.enabled || !OptimisePoses(path, relations, options.pose_graph).usable) return;
+  if (!options.pose_graph.enabled || !OptimiseLoopGraph(path, relations, options.pose_graph).usable) return;
   MoveTo(path, T_map_last);
   drawing.StartAgain(trail.made());
 }

@@ -1,4 +1,5 @@
-// Where a mapper's path lies by stamps, for those who keep poses that were reported before it was corrected (mapper.h).
+// Where a mapper's path lies by stamps, for those who keep poses that were reported before it was corrected, and how
+// the map is drawn where no scan does it (mapper.h).
 #include "server/slam/mapper_state.h"
 
 namespace cairn::slam {
@@ -37,6 +38,25 @@ bool Mapper::DrawLate() {
 
 bool Mapper::draws_late() const {
   return state_->drawing.late();
+}
+
+void Mapper::SettlePath() {
+  state_->SettlePath();
+}
+
+bool Mapper::DrawAgain() {
+  State& s = *state_;
+  s.drawing.Continue(s.trail.keyframes(), s.believed_path());
+  return s.drawing.redrawing();
+}
+
+bool Mapper::draws_again() const {
+  return state_->drawing.redrawing();
+}
+
+void Mapper::FinishMap() {
+  SettlePath();
+  state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 
 std::uint64_t Mapper::keyframes_drawn() const {

@@ -42,6 +42,7 @@ TEST(Kill, TwentyKillsChangeNothing) {
     options.most_up_s = 0.6;
     options.kills = kKills - kills;
     options.seed = round;
+    options.ends = true;
     const KilledFleetOutcome outcome = RunKilledFleet(options);
     SCOPED_TRACE(testing::PrintToString(outcome.differences));
     ASSERT_GT(outcome.kills, 0);

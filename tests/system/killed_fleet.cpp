@@ -301,6 +301,7 @@ class Drive {
       result.used = account.at("used");
       result.unexplained = account.at("unexplained");
       result.account = ObjectPrintedBy(Start({"status", robot})->Wait(kLongest)).dump();
+      if (options_.ends) static_cast<void>(ObjectPrintedBy(Start({"session", "end", robot})->Wait(kLongest)));
       const std::string file = (options_.directory / (state + "-" + robot + ".tum")).string();
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
       result.path = Must(ReadTum(file));

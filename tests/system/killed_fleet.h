@@ -23,6 +23,7 @@ struct KilledFleetOptions {
   double most_starting_s = 0.3;  // Each third kill is followed by one of a server that lives at most this long at all.
   std::uint64_t seed = 1;
   std::vector<std::string> settings;  // Of both servers: "NAME=VALUE".
+  bool ends = false;                  // Their sessions are ended before their paths are compared.
   bool orders = false;  // Meanwhile somebody gives orders (killed_orders.h). The paths are not compared then.
 };
 

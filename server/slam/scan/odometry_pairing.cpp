@@ -55,8 +55,9 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
       "Scans that may wait for odometry. When there are more, the oldest is dropped. A scan whose beams were "
       "measured one after the other waits until there is odometry at its last beam.");
   visitor.Real("no_odometry_after_s", options.no_odometry_after_s, "s", 0.1, 1e7,
-               "When the first scans have waited for the first odometry for so long, by their stamps, the robot counts "
-               "as one without odometry, and is mapped from its scans alone until it sends some.");
+               "When the first scans have waited for the first odometry for so long, by their stamps, and in a "
+               "server by its clock, the robot counts as one without odometry, and is mapped from its scans alone "
+               "until it sends some.");
   visitor.Integer(
       "no_odometry_after_scans", options.no_odometry_after_scans, "scans", 2, 10000,
       "The same after so many waiting scans, whatever their time. A client that bounds how far it runs ahead "

@@ -101,5 +101,38 @@ TEST_F(TwoLidars, NotMoreThanSomeAreHeld) {
   EXPECT_EQ(merge_.TakeAll().size(), ScanMerge::kMostHeld);
 }
 
+// Its odometry comes on a topic of its own, and a client that sends what it has kept may be seconds ahead with its
+// scans.
+class FirstScans : public TwoLidars {
+ protected:
+  FirstScans() { merge_ = ScanMerge(std::chrono::seconds(2), 4); }
+};
+
+TEST_F(FirstScans, WaitForTheFirstOdometry) {
+  for (const int ms : {0, 1000, 2000}) EXPECT_TRUE(Add(kFront, At(ms)).empty());
+  merge_.OdometryCame();
+  EXPECT_EQ(StampsOf(merge_.TakeDue(now_)), (std::vector<Stamp>{At(0), At(1000), At(2000)}));
+  EXPECT_EQ(Add(kFront, At(3000)), (std::vector<Stamp>{At(3000)}));
+}
+
+TEST_F(FirstScans, PassWhereNoOdometryComes) {
+  EXPECT_TRUE(Add(kFront, At(0)).empty());
+  now_ += milliseconds(1999);
+  EXPECT_TRUE(Add(kFront, At(100)).empty());
+  now_ += milliseconds(1);
+  EXPECT_EQ(StampsOf(merge_.TakeDue(now_)), (std::vector<Stamp>{At(0), At(100)}));
+  EXPECT_EQ(Add(kFront, At(200)), (std::vector<Stamp>{At(200)}));
+}
+
+TEST_F(FirstScans, WaitOnlyAsLongAsThereIsRoomForThem) {
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(Add(kFront, At(i)).empty());
+  EXPECT_EQ(Add(kFront, At(4)).size(), 5U);
+}
+
+TEST_F(FirstScans, PassWhenNothingMoreWillCome) {
+  EXPECT_TRUE(Add(kFront, At(0)).empty());
+  EXPECT_EQ(StampsOf(merge_.TakeAll()), (std::vector<Stamp>{At(0)}));
+}
+
 }  // namespace
 }  // namespace cairn::server
