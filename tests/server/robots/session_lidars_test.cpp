@@ -45,23 +45,23 @@ TEST(Session, UsesTheScansOfTwoLidarsWhoseDriversDoNotWaitForEachOther) {
 // The two topics of a robot do not keep one order. Its first scans were used without the odometry that came right after
 // them, and its path was another one each time.
 TEST(Session, WaitsForTheOdometryOfTheFirstScansHoweverFarTheseAreAhead) {
-  constexpr int kScans = 40;  // Four seconds.
+  constexpr int kSteps = 40;  // Four seconds.
   const auto path = [](int ahead) {
     OneSession one;
-    for (int step = 0; step < kScans + ahead; ++step) {
-      if (step < kScans) {
+    for (int step = 0; step < kSteps + ahead; ++step) {
+      if (step < kSteps) {
         EXPECT_TRUE(one.session().Take(ScanOf("r1", RoomScan(step))));
       }
       if (step >= ahead) one.session().Take(OdometryOf("r1", RoomOdometry(step - ahead)));
     }
-    EXPECT_TRUE(one.WaitSettled(kScans));
+    EXPECT_TRUE(one.WaitSettled(kSteps));
     std::vector<Pose2> poses;
     for (const PoseReport& pose : one.sent().All<PoseReport>()) poses.push_back(pose.T_map_robot);
     return poses;
   };
   const std::vector<Pose2> together = path(0);
-  EXPECT_EQ(together.size(), std::size_t{kScans});
-  EXPECT_EQ(path(kScans), together);
+  EXPECT_EQ(together.size(), std::size_t{kSteps});
+  EXPECT_EQ(path(kSteps), together);
 }
 
 }  // namespace
