@@ -117,6 +117,7 @@ double FarthestFromPlace(const std::vector<SessionMaterial>& material,
   double farthest_m = 0.0;
   for (std::size_t i = 0; i < material.size(); ++i) {
     if (!material[i].start_found || !joint[i].joined || !material[joint[i].frame].start_known) continue;
+    if (material[i].snapshot.online_path.empty() || joint[i].path.empty()) continue;
     const Eigen::Vector2d before = material[i].snapshot.online_path.front().translation();
     farthest_m = std::max(farthest_m, (joint[i].path.front().translation() - before).norm());
   }
@@ -161,7 +162,8 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   if (job.kind == JobKind::kJoin && !JoinsAny(material, shown)) {
     const auto alignment = align ? AlignmentOf(material, joint, go_on) : Alignment{};
     if (!alignment) return Fail(StatusCode::kCancelled, "cancelled");
-    // No path is off by so much: it was joined at a wrong place. There, its map need not have been any worse.
+    // No path is off by so much: it was joined at a wrong place. Its map may agree as well there, so that does not
+    // count.
     const double elsewhere_m = align ? FarthestFromPlace(material, joint) : 0.0;
     const bool was_wrong = elsewhere_m > kWrongPlaceM;
     smoothed.aligns = alignment->IsBetter() || was_wrong;

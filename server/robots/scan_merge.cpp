@@ -42,7 +42,7 @@ std::vector<ScanArrival> ScanMerge::TakeAll() {
 
 bool ScanMerge::WaitsForOdometry(Clock::time_point now) {
   if (odometry_patience_ == Clock::duration{}) return false;
-  const bool waits = !first_at_ || (now - *first_at_ < odometry_patience_ && held_.size() <= most_waiting_);
+  const bool waits = !first_at_ || (now - *first_at_ < odometry_patience_ && held_.size() < most_waiting_);
   if (!waits) OdometryCame();
   return waits;
 }

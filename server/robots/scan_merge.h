@@ -29,7 +29,7 @@ class ScanMerge {
   static constexpr std::chrono::milliseconds kPatience{200};
   static constexpr std::size_t kMostHeld = 64;
 
-  // After `odometry_patience`, or with more than `most_waiting` scans, nobody waits for odometry any more.
+  // After `odometry_patience`, or when `most_waiting` scans wait, no scan waits for odometry any more.
   explicit ScanMerge(Clock::duration odometry_patience = {}, std::size_t most_waiting = kMostHeld)
       : odometry_patience_(odometry_patience), most_waiting_(std::min(most_waiting, kMostHeld)) {}
 

@@ -94,10 +94,17 @@ void Session::EnqueueAll() {
   Enqueue(merge_.TakeAll());
 }
 
-void Session::EnqueueDue(bool odometry_came) {
+void Session::EnqueueDue() {
   const MutexLock lock(merge_mutex_);
-  if (odometry_came) merge_.OdometryCame();
   Enqueue(merge_.TakeDue(ScanMerge::Clock::now()));
+}
+
+void Session::WaitNoMoreForOdometry() {
+  {
+    const MutexLock lock(merge_mutex_);
+    merge_.OdometryCame();
+  }
+  EnqueueDue();
 }
 
 void Session::Take(OdometryArrival&& arrival) {
@@ -113,7 +120,7 @@ void Session::Take(OdometryArrival&& arrival) {
     record_.OdometryDropped(merged->stream.session, merged->odometry.sequence, DropReason::kQueueFull);
     Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
   }
-  EnqueueDue(true);
+  WaitNoMoreForOdometry();
   Schedule();
 }
 
@@ -222,7 +229,7 @@ void Session::Replay(JournalEntry&& entry, const SessionEstimator::Switched& swi
 void Session::Replayed() {
   Throws([this] { estimator_.Replayed(); });  // Also of one that failed: what it has drawn is part of the map.
   record_.Restored(stored_.quiet_since_ms);
-  if (record_.begun()) EnqueueDue(true);  // Whether it has odometry is known.
+  if (record_.begun()) WaitNoMoreForOdometry();  // Its first scans were used.
   if (record_.phase() == SessionPhase::kEnded) ending_ = true;
   state_unsent_ = true;
 }

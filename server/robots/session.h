@@ -120,7 +120,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
  private:
   void Enqueue(std::vector<ScanArrival>&& scans) CAIRN_REQUIRES(merge_mutex_);
   void EnqueueAll() CAIRN_EXCLUDES(merge_mutex_);
-  void EnqueueDue(bool odometry_came = false) CAIRN_EXCLUDES(merge_mutex_);
+  void EnqueueDue() CAIRN_EXCLUDES(merge_mutex_);
+  void WaitNoMoreForOdometry() CAIRN_EXCLUDES(merge_mutex_);
   void Schedule();
   void Drain();
   void Handle(RobotEvent&& event);

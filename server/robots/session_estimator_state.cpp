@@ -85,7 +85,8 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (switch_completed_ && !*switch_completed_) return nullptr;
-  if (pipeline_.mapper().draws_late() || FinishesMap()) return nullptr;  // It would draw them all, or never.
+  // The server that loads it would draw all of them at once, or, after the end, none.
+  if (pipeline_.mapper().draws_late() || FinishesMap()) return nullptr;
   // An older server of the same format would not read it, and the next scan ends this.
   if (pipeline_.odometry_has_just_begun()) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.

@@ -59,7 +59,7 @@ void Mapper::State::MoveTo(std::span<const Pose2> path, const Pose2& T_map_last)
 // one will. Other robots wait for the thread of this one: so the fit is that of a large loop, which takes milliseconds.
 void Mapper::State::SettlePath() {
   const std::vector<PoseRelation> relations = trail.relations();
-  if (localisation || !filter->rebases() || !filter->placed() || relations.empty()) return;
+  if (localisation || !filter->rebases() || !filter->placed() || HasFewLoops(trail.measured())) return;
   std::vector<Pose2> path = believed_path().values();
   const Pose2 T_map_last = path.back();
   if (!options.pose_graph.enabled || !OptimiseLoopGraph(path, relations, options.pose_graph).usable) return;

@@ -120,7 +120,9 @@ ScanOutcome Mapper::State::ReportLocalised(Stamp stamp, const Pose2& T_odom_robo
   outcome.covariance = place.covariance;
   outcome.score = score;
   outcome.reason = place.reason;
-  outcome.localized = outcome.reason != PoseReason::kLost;
+  outcome.localized = place.localized();
+  // It is followed, with too much doubt.
+  if (!outcome.localized && outcome.reason == PoseReason::kTracking) outcome.reason = PoseReason::kOdometryOnly;
   return outcome;
 }
 

@@ -2,7 +2,10 @@
 // tells.
 #include <gtest/gtest.h>
 
-#include "tests/eventually.h"
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
 #include "tests/server/slam/equal_wings.h"
 #include "tests/server/support/walled_robot.h"
 

@@ -60,6 +60,11 @@ void Visit(OptionVisitor& visitor, PoseGraphOptions& options) {
                   "Most iterations of the least squares in each of its three steps.");
 }
 
+bool HasFewLoops(std::span<const PoseRelation> relations) {
+  constexpr std::ptrdiff_t kFew = 10;
+  return std::ranges::count_if(relations, &PoseRelation::loop) <= kFew;
+}
+
 double LoopWeight(double squared_error) {
   return 1.0 / (1.0 + squared_error / (kLoopLoss * kLoopLoss));
 }

@@ -47,6 +47,10 @@ struct PoseGraphSummary {
   bool cancelled = false;  // `go_on` returned false; `poses` are unchanged.
 };
 
+// Whether so few loops hold a path that one wrong one, which no other contradicts, may have bent it. Then scans have to
+// judge the path that fits them (smoothing/smoothed_map.h).
+[[nodiscard]] bool HasFewLoops(std::span<const PoseRelation> relations);
+
 // The error (x, y, theta) of a relation at the given poses, in the frame `from`, and its derivatives by both
 // poses.
 struct PoseRelationError {

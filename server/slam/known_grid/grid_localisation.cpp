@@ -16,10 +16,10 @@ constexpr double kGuessSigmaM = 0.1;  // The alignment may correct the pose by s
 constexpr double kGuessSigmaRad = 0.03;
 constexpr double kMapSigmaM = 0.02;  // Errors of the map: less than half a cell.
 constexpr double kMapSigmaRad = 0.003;
-// With more doubt than this the robot is followed on, but not told as localized: three standard deviations reach half a
+// With more doubt than this the robot is followed on, but it is not localized: three standard deviations reach half a
 // metre, which is another place.
-constexpr double kToldSigmaM = 0.17;
-constexpr double kToldSigmaRad = 0.07;
+constexpr double kLocalizedSigmaM = 0.17;
+constexpr double kLocalizedSigmaRad = 0.07;
 constexpr double kLostSigmaM = 0.5;  // With more doubt than this the robot is lost.
 constexpr double kLostSigmaRad = 0.15;
 constexpr double kCompareEveryM = 0.5;  // As the self-check of a robot that maps.
@@ -31,10 +31,6 @@ bool IsBeyond(const Eigen::Matrix3d& covariance, double sigma_m, double sigma_ra
   return covariance(0, 0) > most || covariance(1, 1) > most || covariance(2, 2) > sigma_rad * sigma_rad;
 }
 
-PoseReason Told(PoseReason reason, const Eigen::Matrix3d& covariance) {
-  return IsBeyond(covariance, kToldSigmaM, kToldSigmaRad) ? PoseReason::kLost : reason;
-}
-
 // The symmetric part of a matrix without its negative eigenvalues.
 Eigen::Matrix3d PositivePart(const Eigen::Matrix3d& matrix) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(0.5 * (matrix + matrix.transpose()));
@@ -42,6 +38,12 @@ Eigen::Matrix3d PositivePart(const Eigen::Matrix3d& matrix) {
 }
 
 }  // namespace
+
+bool GridLocalisation::Place::localized() const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance.topLeftCorner<2, 2>());
+  return reason != PoseReason::kLost && axes.eigenvalues().maxCoeff() <= kLocalizedSigmaM * kLocalizedSigmaM &&
+         covariance(2, 2) <= kLocalizedSigmaRad * kLocalizedSigmaRad;
+}
 
 GridLocalisation::GridLocalisation(const GridLocalisationOptions& options)
     : options_(options),
@@ -100,7 +102,7 @@ GridLocalisation::Place GridLocalisation::CarriedTo(const Pose2& T_odom_robot) c
   const double blind_m = unmatched_m_ + moved.translation().norm();
   const Eigen::Matrix3d covariance = last_.covariance + J * options_.blind.Covariance(moved) * J.transpose();
   const PoseReason reason = blind_m > options_.lost_after_m ? PoseReason::kLost : PoseReason::kOdometryOnly;
-  return {last_.T_map_robot * moved, covariance, Told(reason, covariance)};
+  return {last_.T_map_robot * moved, covariance, reason};
 }
 
 GridLocalisation::Followed GridLocalisation::Take(const Sight& sight) {
@@ -192,7 +194,7 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
     blind_covariance_.setZero();
     contradicted = Contradicted(sight, now.T_map_robot);
   }
-  last_ = {now.T_map_robot, now.covariance, Told(reason, now.covariance)};
+  last_ = {now.T_map_robot, now.covariance, reason};
   T_odom_robot_ = sight.scan.T_odom_robot;
   T_track_kept_ = step.T_track_robot;
   if (contradicted) {

@@ -65,6 +65,9 @@ class GridLocalisation {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     PoseReason reason = PoseReason::kLost;
 
+    // Neither lost nor with a doubt that reaches another place.
+    [[nodiscard]] bool localized() const;
+
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
       archive(self.T_map_robot, self.covariance, self.reason);

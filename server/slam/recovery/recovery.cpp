@@ -256,7 +256,7 @@ bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) con
 }
 
 // A robot that comes back into the map has seen for some metres what the map does not show, and that would count
-// against its place. So now the whole last stretch is taken, now only its last part.
+// against its place. So the whole last stretch is used, its last 6 m and its last 3 m, in turn along the way.
 std::span<const RecentScan> Recovery::LastPart() const {
   const double way_m = recent_.back().travelled_m;
   const double stretch_m = kStretchesM[static_cast<std::size_t>(way_m / kNextStretchM) % kStretchesM.size()];

@@ -160,15 +160,25 @@ std::vector<SessionRelation> RivalPlaces(std::size_t a, SessionMap& map_a, std::
                                          const SoughtRivals& sought, const LoopOptions& options, const GoOn& go_on,
                                          RelationBook& book) {
   PlacesOfBoth rivals(a, map_a, b, map_b, options, book, sought.is_rival);
+  // First what earlier jobs have found, which costs no search.
+  const auto found_first = [&book](std::vector<std::size_t> places, const SessionMap& known, const SessionMap& seen) {
+    std::ranges::stable_partition(places, [&](std::size_t k) {
+      const Measurement* const one = book.Find({known.session(), seen.session()}, MeasurementKind::kPlace, seen.id(k));
+      return one != nullptr && one->found;
+    });
+    return places;
+  };
+  const std::vector<std::size_t> of_a = found_first(sought.of_a, map_b, map_a);
+  const std::vector<std::size_t> of_b = found_first(sought.of_b, map_a, map_b);
   const std::size_t before = book.measured();
   const auto goes_on = [&] {
     return go_on() && book.measured() - before < (rivals.none() ? sought.most_until_first : sought.most);
   };
   for (const std::size_t pass : kPasses) {
-    for (std::size_t i = pass; i < std::max(sought.of_a.size(), sought.of_b.size()); i += kPasses.size()) {
+    for (std::size_t i = pass; i < std::max(of_a.size(), of_b.size()); i += kPasses.size()) {
       if (rivals.AreProof(kEnoughPlaces)) return rivals.Relations();
-      if (i < sought.of_b.size() && goes_on()) rivals.LookForB(sought.of_b[i]);
-      if (i < sought.of_a.size() && goes_on()) rivals.LookForA(sought.of_a[i]);
+      if (i < of_b.size() && goes_on()) rivals.LookForB(of_b[i]);
+      if (i < of_a.size() && goes_on()) rivals.LookForA(of_a[i]);
     }
   }
   return rivals.AreProof(kMinPlaces) ? rivals.Relations() : std::vector<SessionRelation>{};

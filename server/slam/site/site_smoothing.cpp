@@ -1,9 +1,7 @@
 #include "server/slam/site/site_smoothing.h"
 
 #include <algorithm>
-#include <cmath>
 #include <deque>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -23,9 +21,9 @@ constexpr std::size_t kMinRelations = 3;  // Two sessions are not related by few
 constexpr std::size_t kMinComparedPlaces = 5;
 constexpr int kRounds = 3;                  // Searches near the paths, each along the paths of the last one.
 constexpr std::size_t kRivalSearches = 24;  // Of one job.
-// A session is moved away from where it was joined if so many times as much is explained then, or simply more where
-// less than half as much contradicts it; but never where more contradicts it.
-constexpr double kOutvotes = 1.25, kMuchLess = 0.5, kMoreContradicting = 0.002;
+// A session is moved away from where it was joined if this share of what is compared contradicts it there, and if less
+// than half as much does where it is moved to, and more is explained. What a right join shows is never contradicted.
+constexpr double kContradicted = 0.004, kMuchLess = 0.5;
 constexpr double kEnoughMore = 1.02;  // No further search if the last one found no more than this ratio.
 
 class Smoothing {
@@ -218,10 +216,14 @@ class Smoothing {
 
   // Sessions that jobs have joined may lie at a wrong place (rival_places.h).
   bool LookForRivals() {
-    bool moved = false;
     std::size_t searches = kRivalSearches;
-    for (const Pair& pair : Pairs()) {
-      if (!graph_.Together(pair.a, pair.b) || (told_[pair.a] && told_[pair.b])) continue;
+    auto pairs = Pairs();
+    std::erase_if(pairs, [this](const Pair& pair) { return told_[pair.a] && told_[pair.b]; });
+    // The searches do not suffice for all. What the book has grown by since the last job decides who is the first.
+    if (!pairs.empty()) std::ranges::rotate(pairs, pairs.begin() + static_cast<int>(book_.size() % pairs.size()));
+    bool moved = false;
+    for (const Pair& pair : pairs) {
+      if (!graph_.Together(pair.a, pair.b)) continue;
       const std::size_t before = book_.measured();
       const auto rivals = RivalsOf(graph_, maps_, pair.a, pair.b, searches, options_.loop, Asked(), book_);
       if (!go_on_(done_)) return false;
@@ -235,13 +237,14 @@ class Smoothing {
     return !moved || Refine();
   }
 
-  // Moves what has to be moved so that two sessions lie as these relations between them say, if this explains more than
-  // how they lie now, and nothing contradicts it. Whether it did so; nothing: cancelled.
+  // Moves what has to be moved so that two sessions lie as these relations between them say, if scans contradict how
+  // they lie now, and this explains more and is contradicted less. Whether it did so; nothing: cancelled.
   std::optional<bool> OutvotePresent(const Pair& pair, std::span<const SessionRelation> rivals) {
     const WeakestCut cut = WeakestCutBetween(graph_, pair.a, pair.b, told_);
     std::vector<Pair> across = Pairs();
     std::erase_if(across, [&cut](const Pair& one) { return cut.moves[one.a] == cut.moves[one.b]; });
     const double contradicting = ContradictingShare(across);
+    if (contradicting < kContradicted) return false;
     const SiteGraph before = graph_;
     for (const auto& [a, b] : across) graph_.RemoveBetween(a, b);
     if (!Solve()) return std::nullopt;
@@ -261,10 +264,8 @@ class Smoothing {
     std::size_t squares = 0;
     for (const auto& [a, b] : across) squares += IsTrusted(a, b) ? ExplainedSquares(graph_, a, b) : 0;
     const double contradicts = ContradictingShare(across);
-    const double enough = contradicts < kMuchLess * contradicting ? 1.0 : kOutvotes;
-    if (graph_.Together(pair.a, pair.b) && contradicts <= contradicting + kMoreContradicting &&
-        static_cast<double>(squares) > enough * static_cast<double>(cut.squares))
-      return true;
+    const bool better = contradicts < kMuchLess * contradicting && squares > cut.squares;
+    if (better && graph_.Together(pair.a, pair.b)) return true;
     TakeBack(before);
     return false;
   }
@@ -320,7 +321,7 @@ class Smoothing {
   [[nodiscard]] const SessionAgreement& AgreementBetween(std::size_t a, std::size_t b) {
     const auto [known, added] = agreements_.try_emplace({a, b});
     if (added) {
-      const PosePath path_a = PathOf(a), path_b = PathOf(b);
+      const PosePath path_a = AsPosePath(graph_.path(a)), path_b = AsPosePath(graph_.path(b));
       known->second = AgreementOf({a, maps_[a], path_a}, {b, maps_[b], path_b}, options_);
     }
     return known->second;
@@ -333,16 +334,10 @@ class Smoothing {
     return agreement.places >= kMinComparedPlaces && !Contradicts(agreement);
   }
 
-  [[nodiscard]] PosePath PathOf(std::size_t session) const {
-    PosePath path;
-    for (const Pose2& pose : graph_.path(session)) path.Append(pose);
-    return path;
-  }
-
   // `aside`: a book for what is not to be noted in that of the site.
   [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties,
                                                           RelationBook* aside = nullptr) {
-    const PosePath path_a = PathOf(a), path_b = PathOf(b);
+    const PosePath path_a = AsPosePath(graph_.path(a)), path_b = AsPosePath(graph_.path(b));
     RelationBook& book = aside == nullptr ? book_ : *aside;
     return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book);
   }
@@ -391,8 +386,7 @@ std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteS
   for (std::size_t s = 0; s < maps.size(); ++s) results.push_back(smoothing.ResultOf(s));
   if (search != SiteSearch::kRobots) return results;
   std::vector<PosePath> online(maps.size());
-  for (std::size_t s = 0; s < maps.size(); ++s)
-    for (const Pose2& pose : sessions[s].snapshot.online_path) online[s].Append(pose);
+  for (std::size_t s = 0; s < maps.size(); ++s) online[s] = AsPosePath(sessions[s].snapshot.online_path);
   for (std::size_t s = 0; s < maps.size(); ++s) results[s].agreement_before = smoothing.AgreementBefore(s, online);
   return results;
 }

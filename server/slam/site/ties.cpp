@@ -9,13 +9,13 @@ namespace {
 
 constexpr double kTieEveryM = 3.0;  // Way between two ties.
 
-PosePath AsPosePath(const std::vector<Pose2>& poses) {
+}  // namespace
+
+PosePath AsPosePath(std::span<const Pose2> poses) {
   PosePath path;
   for (const Pose2& pose : poses) path.Append(pose);
   return path;
 }
-
-}  // namespace
 
 std::vector<Tie> TiesBetween(const SiteGraph& graph, std::size_t a, std::size_t b, double reach_m) {
   std::vector<Tie> ties;

@@ -14,6 +14,9 @@ namespace cairn::slam {
 // they come nearest, if that is within `reach_m`; else their first keyframes are named. REQUIRES: a < b.
 [[nodiscard]] std::vector<Tie> TiesBetween(const SiteGraph& graph, std::size_t a, std::size_t b, double reach_m);
 
+// A path of poses as one that is searched for what lies near.
+[[nodiscard]] PosePath AsPosePath(std::span<const Pose2> poses);
+
 // The way from the nearest tie to two keyframes, along both sessions. Infinite without ties.
 [[nodiscard]] double WayFromTie(std::span<const Tie> ties, const SessionMap& known, std::size_t known_keyframe,
                                 const SessionMap& seen, std::size_t seen_keyframe);

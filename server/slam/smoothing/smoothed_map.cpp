@@ -58,11 +58,9 @@ bool IsChosenByScans(const MapperSnapshot& snapshot) {
   return snapshot.pose_graph.enabled && snapshot.relations.empty();
 }
 
-// True if so few places were seen again that one wrong relation, which no other contradicts, may have bent the path.
+// True if one wrong relation may have bent the fitted path.
 bool IsJudgedByScans(const MapperSnapshot& snapshot) {
-  constexpr std::ptrdiff_t kFew = 10;
-  return snapshot.pose_graph.enabled && !snapshot.relations.empty() &&
-         std::ranges::count_if(snapshot.relations, &PoseRelation::loop) <= kFew;
+  return snapshot.pose_graph.enabled && !snapshot.relations.empty() && HasFewLoops(snapshot.relations);
 }
 
 // The best particle's path is one sample of many, and the online path their mean. So the sample is taken only where the

@@ -3,8 +3,9 @@
 // nothing to optimise. Then two paths are compared, the best particle's (one sample of many) and the online
 // path (their mean), and the result is the online path, unless the scans clearly agree better with the other one: each
 // scan is compared with a map in which it was not drawn. Where few places were seen again, the fitted path is not taken
-// if the scans clearly agree better with the online path. With `pose_graph.enabled` off it is always the best
-// particle's path (thesis A 5.4). Stateless, thread-safe, deterministic. May take seconds on long paths.
+// if the scans clearly agree better with the online path (one that was fitted elsewhere, MapAlong, is taken as it is).
+// With `pose_graph.enabled` off it is always the best particle's path (thesis A 5.4). Stateless, thread-safe,
+// deterministic. May take seconds on long paths.
 #pragma once
 
 #include <functional>

@@ -93,8 +93,11 @@ class Sent {
 
 class OneSession {
  public:
-  explicit OneSession(const RobotsOptions& options = {}, const std::string& robot = "r1") : robot_(robot) {
+  explicit OneSession(const RobotsOptions& options = {}, const std::string& robot = "r1",
+                      const slam::PairingOptions& pairing = {})
+      : robot_(robot) {
     EstimatorSetup estimator;
+    estimator.mapper.pairing = pairing;
     estimator.mapper.filter.particles = 20;
     session_ = std::make_shared<Session>(
         SessionSetup{.id = 1, .request = RequestOf(robot), .map_epoch = 3, .estimator = estimator}, options, pool_,

@@ -125,8 +125,8 @@ TEST_F(FirstScans, PassWhereNoOdometryComes) {
 }
 
 TEST_F(FirstScans, WaitOnlyAsLongAsThereIsRoomForThem) {
-  for (int i = 0; i < 4; ++i) EXPECT_TRUE(Add(kFront, At(i)).empty());
-  EXPECT_EQ(Add(kFront, At(4)).size(), 5U);
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(Add(kFront, At(i)).empty());
+  EXPECT_EQ(Add(kFront, At(3)).size(), 4U);
 }
 
 TEST_F(FirstScans, PassWhenNothingMoreWillCome) {

@@ -47,7 +47,7 @@ TEST(Session, UsesTheScansOfTwoLidarsWhoseDriversDoNotWaitForEachOther) {
 TEST(Session, WaitsForTheOdometryOfTheFirstScansHoweverFarTheseAreAhead) {
   constexpr int kSteps = 40;  // Four seconds.
   const auto path = [](int ahead) {
-    OneSession one;
+    OneSession one({}, "r1", {.no_odometry_after_s = 1e6});
     for (int step = 0; step < kSteps + ahead; ++step) {
       if (step < kSteps) {
         EXPECT_TRUE(one.session().Take(ScanOf("r1", RoomScan(step))));
@@ -62,6 +62,16 @@ TEST(Session, WaitsForTheOdometryOfTheFirstScansHoweverFarTheseAreAhead) {
   const std::vector<Pose2> together = path(0);
   EXPECT_EQ(together.size(), std::size_t{kSteps});
   EXPECT_EQ(path(kSteps), together);
+}
+
+// All that wait go on at once. One more than the queue holds waited, and the first was dropped.
+TEST(Session, OfARobotWithoutOdometryNoMoreScansWaitThanItsQueueHolds) {
+  constexpr int kQueue = 4;
+  OneSession one({.queue_scans = kQueue}, "r1", {.no_odometry_after_s = 1e6, .no_odometry_after_scans = kQueue});
+  for (int step = 0; step < kQueue; ++step) EXPECT_TRUE(one.session().Take(ScanOf("r1", RoomScan(step))));
+  EXPECT_TRUE(one.WaitSettled(kQueue));
+  for (const Ledger& ledger : one.session().record().snapshot().status.ledgers)
+    EXPECT_EQ(Dropped(ledger, DropReason::kQueueFull), 0U) << ledger.sensor;
 }
 
 }  // namespace

@@ -3,6 +3,9 @@
 // drives anticlockwise round the square, so that the hall follows it, then the second wing.
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -28,11 +31,15 @@ inline World EqualWings(double wing_m, double hall_m) {
   };
   constexpr std::uint64_t kWing = 11, kHall = 12, kOtherHall = 13, kInside = 100;
   const double x = wing_m, y = hall_m;
-  wall({-1, -1}, {x + 1, -1}, {0, -1}, kWing), wall({x + 1, -1}, {x + 1, y + 1}, {1, 0}, kHall);
-  wall({x + 1, y + 1}, {-1, y + 1}, {0, 1}, kWing), wall({-1, y + 1}, {-1, -1}, {-1, 0}, kOtherHall);
+  wall({-1, -1}, {x + 1, -1}, {0, -1}, kWing);
+  wall({x + 1, -1}, {x + 1, y + 1}, {1, 0}, kHall);
+  wall({x + 1, y + 1}, {-1, y + 1}, {0, 1}, kWing);
+  wall({-1, y + 1}, {-1, -1}, {-1, 0}, kOtherHall);
   // Round the block in the middle.
-  wall({1, 1}, {x - 1, 1}, {0, 1}, kWing + kInside), wall({x - 1, 1}, {x - 1, y - 1}, {-1, 0}, kHall + kInside);
-  wall({x - 1, y - 1}, {1, y - 1}, {0, -1}, kWing + kInside), wall({1, y - 1}, {1, 1}, {1, 0}, kOtherHall + kInside);
+  wall({1, 1}, {x - 1, 1}, {0, 1}, kWing + kInside);
+  wall({x - 1, 1}, {x - 1, y - 1}, {-1, 0}, kHall + kInside);
+  wall({x - 1, y - 1}, {1, y - 1}, {0, -1}, kWing + kInside);
+  wall({1, y - 1}, {1, 1}, {1, 0}, kOtherHall + kInside);
   return world;
 }
 

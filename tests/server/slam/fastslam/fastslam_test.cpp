@@ -41,6 +41,30 @@ struct Make {
   }
 };
 
+// Of the standard deviations of (x, y, theta) as they spread after a step with this covariance.
+Eigen::Vector3d SpreadDrawn(const FastSlamOptions& options, const Eigen::Matrix3d& covariance) {
+  constexpr int kMany = 20000;
+  ParticleSet set(options, kMany, {}, 1);
+  set.Predict({1.0, 0.0, 0.0}, covariance);
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < kMany; ++i) {
+    set.Sample(i);
+    EXPECT_TRUE(set[i].covariance.isZero());
+    const Pose2& pose = set[i].T_map_robot;
+    squares += Eigen::Vector3d(pose.x - 1.0, pose.y, pose.theta).cwiseAbs2();
+  }
+  return (squares / kMany).cwiseSqrt();
+}
+
+TEST(ParticleSet, DrawsTheToldShareOfTheNoise) {
+  const Eigen::Vector3d sigma(0.2, 0.1, 0.05);
+  const Eigen::Matrix3d covariance = sigma.cwiseAbs2().asDiagonal();
+  for (const double share : {1.0, 0.5}) {
+    const Eigen::Vector3d spread = SpreadDrawn({.drawn_share = share}, covariance);
+    EXPECT_LT((spread.cwiseQuotient(share * sigma) - Eigen::Vector3d::Ones()).cwiseAbs().maxCoeff(), 0.05) << share;
+  }
+}
+
 // All particles but one are at one place, and the doubt has been found to be small. The one far away has a path that is
 // eight times as likely as that of each other, but together they weigh twelve times as much. The pose was that one.
 TEST(ParticleSet, ThePoseIsWhereTheWeightIs) {

@@ -123,8 +123,10 @@ TEST(LocaliseIn, ARobotOutsideOfTheMapIsNotLocalizedWhereItsDoubtReachesAnotherP
   EXPECT_GT(robot.localized(), 50U);
   EXPECT_LT(robot.localized(), robot.outcomes.size());
   for (const ScanOutcome& one : robot.outcomes) {
-    const double sigma_m = std::sqrt(one.covariance.diagonal().head<2>().maxCoeff());
+    const Eigen::Matrix2d position = one.covariance.topLeftCorner<2, 2>();
+    const double sigma_m = std::sqrt(position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
     EXPECT_TRUE(!one.localized || sigma_m < 1.1 * kMostSigmaM) << sigma_m;
+    EXPECT_NE(one.reason, PoseReason::kLost);
   }
 }
 
