@@ -19,7 +19,7 @@ namespace cairn::server::testing {
 namespace {
 
 constexpr double kCellM = 0.05;
-constexpr int kSteps = 300;  // Round the room and on, so that it sees again what it saw first.
+constexpr int kSteps = 500;  // Round the room and on, so that it often sees again what it saw first.
 
 // Its wheels slip: without what it sees again, its path would be wrong.
 Odometry SlippingOdometry(int step) {
