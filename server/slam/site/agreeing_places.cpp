@@ -162,7 +162,7 @@ std::vector<SessionRelation> RivalPlaces(std::size_t a, SessionMap& map_a, std::
   PlacesOfBoth rivals(a, map_a, b, map_b, options, book, sought.is_rival);
   // First what earlier jobs have found, which costs no search.
   const auto found_first = [&book](std::vector<std::size_t> places, const SessionMap& known, const SessionMap& seen) {
-    std::ranges::stable_partition(places, [&](std::size_t k) {
+    std::stable_partition(places.begin(), places.end(), [&](std::size_t k) {
       const Measurement* const one = book.Find({known.session(), seen.session()}, MeasurementKind::kPlace, seen.id(k));
       return one != nullptr && one->found;
     });

@@ -220,7 +220,8 @@ class Smoothing {
     auto pairs = Pairs();
     std::erase_if(pairs, [this](const Pair& pair) { return told_[pair.a] && told_[pair.b]; });
     // The searches do not suffice for all. What the book has grown by since the last job decides who is the first.
-    if (!pairs.empty()) std::ranges::rotate(pairs, pairs.begin() + static_cast<int>(book_.size() % pairs.size()));
+    if (!pairs.empty())
+      std::rotate(pairs.begin(), pairs.begin() + static_cast<int>(book_.size() % pairs.size()), pairs.end());
     bool moved = false;
     for (const Pair& pair : pairs) {
       if (!graph_.Together(pair.a, pair.b)) continue;
