@@ -224,7 +224,7 @@ class Smoothing {
       std::rotate(pairs.begin(), pairs.begin() + static_cast<int>(book_.size() % pairs.size()), pairs.end());
     bool moved = false;
     for (const Pair& pair : pairs) {
-      if (!graph_.Together(pair.a, pair.b)) continue;
+      if (!graph_.Together(pair.a, pair.b) || ContradictingShare({&pair, 1}) < kContradicted) continue;
       const std::size_t before = book_.measured();
       const auto rivals = RivalsOf(graph_, maps_, pair.a, pair.b, searches, options_.loop, Asked(), book_);
       if (!go_on_(done_)) return false;
