@@ -82,7 +82,8 @@ std::optional<std::vector<Pose2>> JudgedPath(const MapperSnapshot& snapshot, std
   if (!online) return {};
   const auto after = DisagreementWithOthers(fitted, snapshot, options, next);
   if (!after) return {};
-  return IsClearlySmaller(*online, *after) ? snapshot.online_path : std::move(fitted);
+  if (IsClearlySmaller(*online, *after)) return snapshot.online_path;
+  return fitted;
 }
 
 // The smoothed one first, because after a job the robot's online path is what the job has smoothed.
