@@ -60,7 +60,7 @@ class Smoothing {
       began_with_ = 0;
       if ((!all && !JoinByPlaces()) || !JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
     }
-    if (began_with_ > 0 && search_ != SiteSearch::kFragments && !LookForRivals()) return false;
+    if (began_with_ > 0 && search_ == SiteSearch::kRobots && !LookForRivals()) return false;
     NoteAllBelieved();
     return true;
   }
