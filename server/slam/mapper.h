@@ -123,8 +123,9 @@ class Mapper {
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping, when no scan will follow. Places that were seen again since the last large loop have corrected
   // the pose at once, but not the way to there: now the path is the one that fits them all best, as a smoothing job
-  // would find it from this robot alone. Pose and landmarks follow at once, and the map is drawn again along that path:
-  // DrawAgain draws some of it with each call, a few milliseconds, and returns whether there is more.
+  // would find it from this robot alone. Where few loops hold it, it stays (graph/pose_graph.h: HasFewLoops).
+  // Pose and landmarks follow at once, and the map is drawn again along that path: DrawAgain draws some of it with each
+  // call, a few milliseconds, and returns whether there is more.
   void SettlePath();
   bool DrawAgain();
   // Whether the map is being drawn again, for whatever reason. While scans come, they draw it.

@@ -14,6 +14,9 @@ namespace {
 
 constexpr double kAroundM = 7.5;             // As much way to either side as belongs to a place.
 constexpr std::ptrdiff_t kFewRelations = 3;  // Wrong ones may be there by chance.
+constexpr std::size_t kSearchesUntilFirst = 4;
+constexpr double kOtherHeadingRad = 0.5;  // No error of a path.
+constexpr double kSquareM = 2.0;
 
 // The way of the relations of a session, in ascending order.
 std::vector<double> RelatedAt(const SiteGraph& graph, std::size_t session) {
@@ -25,10 +28,6 @@ std::vector<double> RelatedAt(const SiteGraph& graph, std::size_t session) {
   std::ranges::sort(at_m);
   return at_m;
 }
-
-constexpr std::size_t kSearchesUntilFirst = 4;
-constexpr double kOtherHeadingRad = 0.5;  // No error of a path.
-constexpr double kSquareM = 2.0;
 
 using Squares = std::vector<std::vector<std::size_t>>;
 

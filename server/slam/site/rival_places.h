@@ -1,7 +1,7 @@
-// Looks for signs that two sessions which lie together have been joined at a wrong place. Who had seen one of two equal
-// places only could not know that there is another; what both see later tells, if somebody looks for it away from where
-// the join says that it lies. Looked for are only places where a session has no relations, although others have been
-// there if the join is wrong. Stateless, deterministic.
+// Looks for signs that two sessions which lie together have been joined at a wrong place. A robot that had seen only
+// one of two equal places could not know that there is another. What both see later shows it, if it is looked for away
+// from where the join says that it lies. Only places around which a session has hardly any relations are looked for.
+// Stateless, deterministic.
 #pragma once
 
 #include <cstddef>

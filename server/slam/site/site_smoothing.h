@@ -50,7 +50,9 @@ enum class SiteSearch : std::uint8_t {
   // Only sessions whose start is not known are looked for, and only where sessions of a known place have been. Where
   // one is joined, other relations are left to the next call: the robot drives on meanwhile.
   kFragments,
-  kRobots,  // These, and sessions whose starts are known with each other.
+  // These, and sessions whose starts are known with each other. Where joined sessions contradict each other, they are
+  // also looked for elsewhere (rival_places.h).
+  kRobots,
 };
 
 // One result per session. `book`: what earlier jobs have measured; what this one does is noted there, also where it is
