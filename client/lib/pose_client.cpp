@@ -26,7 +26,8 @@ Result<std::unique_ptr<PoseClient>> PoseClient::Create(wire::Bus& bus, const std
 }
 
 Result<std::unique_ptr<PoseClient::Wire>> PoseClient::Connect(wire::Bus& bus, int number) {
-  auto poses = bus.Subscribe<PoseReport>([this, number](PoseReport&& pose) { OnPose(number, std::move(pose)); });
+  auto poses =
+      bus.SubscribeRobot<PoseReport>(robot_id_, [this, number](PoseReport&& pose) { OnPose(number, std::move(pose)); });
   if (!poses) return tl::unexpected(poses.error());
   auto wire = std::make_unique<Wire>();
   wire->poses = std::move(*poses);

@@ -43,11 +43,17 @@ Result<void> RobotClient::Advertise(Wire& wire) {
 template <typename Value>
 Result<void> RobotClient::SubscribeTo(Wire& wire, void (RobotClient::*on_value)(Value&&),
                                       wire::SubscriptionEvents events) {
-  auto subscription = wire.bus->Subscribe<Value>(
-      [this, on_value, number = wire.number](Value&& value) {
-        if (current_ == number) (this->*on_value)(std::move(value));
-      },
-      std::move(events));
+  auto take = [this, on_value, number = wire.number](Value&& value) {
+    if (current_ == number) (this->*on_value)(std::move(value));
+  };
+  constexpr bool kOfOneRobot = std::is_same_v<Value, PoseReport> || std::is_same_v<Value, Ledger>;
+  Result<std::unique_ptr<wire::Subscription>> subscription = [&] {
+    if constexpr (kOfOneRobot) {
+      return wire.bus->SubscribeRobot<Value>(HashName(robot_), std::move(take), std::move(events));
+    } else {
+      return wire.bus->Subscribe<Value>(std::move(take), std::move(events));
+    }
+  }();
   if (!subscription) return tl::unexpected(subscription.error());
   wire.subscriptions.push_back(std::move(*subscription));
   return {};

@@ -3,8 +3,8 @@
 #include <numeric>
 
 #include "common/wire/participant.h"
+#include "common/wire/partitioned_publication.h"
 #include "common/wire/publication.h"
-#include "common/wire/reply_publication.h"
 #include "common/wire/subscription.h"
 
 namespace cairn::wire {
@@ -59,10 +59,12 @@ Result<std::unique_ptr<Bus>> Bus::Create(const WireOptions& options, const std::
 
 template <typename Value>
 Result<std::unique_ptr<Publication<Value>>> Bus::Advertise(const std::string& robot) {
-  if constexpr (std::is_same_v<Value, Reply>) {
-    return ReplyPublication::Make(ParticipantOf(*this));
+  constexpr Partitions kPartitions = Topic<Value>::kProfile.partitions;
+  if constexpr (kPartitions == Partitions::kReplies || kPartitions == Partitions::kShares) {
+    return PartitionedPublication<Value>::Make(ParticipantOf(*this));
   } else {
-    return DdsPublication<Value>::Make(ParticipantOf(*this), robot);
+    return DdsPublication<Value>::Make(ParticipantOf(*this),
+                                       robot.empty() ? std::vector<std::string>() : std::vector{robot});
   }
 }
 
@@ -75,6 +77,17 @@ Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std
                                                             SubscriptionEvents events) {
   return DdsSubscription<Reply>::Make(ParticipantOf(*this), std::move(on_value), std::move(events), client);
 }
+
+template <typename Value>
+Result<std::unique_ptr<Subscription>> Bus::SubscribeRobot(NameId robot_id, std::function<void(Value&&)> on_value,
+                                                          SubscriptionEvents events) {
+  static_assert(Topic<Value>::kProfile.partitions == Partitions::kShares);
+  return DdsSubscription<Value>::Make(ParticipantOf(*this), std::move(on_value), std::move(events), robot_id);
+}
+template Result<std::unique_ptr<Subscription>> Bus::SubscribeRobot(NameId, std::function<void(PoseReport&&)>,
+                                                                   SubscriptionEvents);
+template Result<std::unique_ptr<Subscription>> Bus::SubscribeRobot(NameId, std::function<void(Ledger&&)>,
+                                                                   SubscriptionEvents);
 
 // The macro's argument is a type and cannot be in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
 #define CAIRN_WIRE_VALUE(Value)                                                                       \

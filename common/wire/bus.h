@@ -97,6 +97,12 @@ class Bus {
   [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeReplies(ClientId client,
                                                                        std::function<void(Reply&&)> on_value,
                                                                        SubscriptionEvents events = {});
+  // Like Subscribe<Value>, but only what is about this robot, and of the others only a share is sent here
+  // (partitions.h). Value is PoseReport or Ledger.
+  template <typename Value>
+  [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeRobot(NameId robot_id,
+                                                                     std::function<void(Value&&)> on_value,
+                                                                     SubscriptionEvents events = {});
 
   [[nodiscard]] virtual const WireOptions& options() const = 0;
   // Number of datagrams that were not valid or not plausible RTPS and were therefore not passed to the middleware.

@@ -75,12 +75,12 @@ Status Participant::NotMade(const std::string& what) const {
   return {StatusCode::kPermissionDenied, "the permissions in " + options_.security + " do not allow " + what};
 }
 
-fd::Publisher* Participant::PublisherFor(const std::string& partition) {
+fd::Publisher* Participant::PublisherFor(const std::vector<std::string>& partitions) {
   const MutexLock lock(mutex_);
-  fd::Publisher*& publisher = publishers_[partition];
+  fd::Publisher*& publisher = publishers_[partitions];
   if (publisher == nullptr) {
     fd::PublisherQos qos;
-    if (!partition.empty()) qos.partition().push_back(partition.c_str());
+    for (const std::string& partition : partitions) qos.partition().push_back(partition.c_str());
     publisher = participant_->create_publisher(qos);
   }
   return publisher;
@@ -97,7 +97,7 @@ fd::Subscriber* Participant::SubscriberFor(const std::string& partition) {
   return subscriber;
 }
 
-std::string Participant::PartitionToRead(Partitions partitions, std::optional<ClientId> only) const {
+std::string Participant::PartitionToRead(Partitions partitions, std::optional<std::uint64_t> only) const {
   switch (partitions) {
     case Partitions::kDefault:
       return {};
@@ -105,6 +105,8 @@ std::string Participant::PartitionToRead(Partitions partitions, std::optional<Cl
       return secure() ? kEveryPartition : "";
     case Partitions::kReplies:
       return only ? ReplyPartition(ReplyPartitionOf(*only)) : kEveryPartition;
+    case Partitions::kShares:
+      return only && has_shares() ? SharePartition(ShareOf(*only)) : "";
   }
   return {};
 }
@@ -124,7 +126,8 @@ Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd:
 }
 
 Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
-                                                    fd::DataWriterListener* listener, const std::string& partition) {
+                                                    fd::DataWriterListener* listener,
+                                                    const std::vector<std::string>& partitions) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataWriterQos qos;
@@ -142,19 +145,20 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   // No filters of readers: Fast DDS 2.9 changes a writer's list of them while the writer uses it.
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
   const bool in_default = profile.partitions == Partitions::kRobots && !secure();
-  fd::Publisher* publisher = PublisherFor(in_default ? "" : partition);
+  fd::Publisher* publisher = PublisherFor(in_default ? std::vector<std::string>() : partitions);
   if (publisher == nullptr) return tl::unexpected(Broken("a publisher"));
   const MutexLock lock(endpoints_);
   fd::DataWriter* writer = publisher->create_datawriter(*topic, qos, listener);
   if (writer == nullptr) {
-    return tl::unexpected(
-        NotMade(std::string("a writer of ") + profile.name + (partition.empty() ? "" : " for '" + partition + "'")));
+    return tl::unexpected(NotMade(std::string("a writer of ") + profile.name +
+                                  (partitions.empty() ? "" : " for '" + partitions.back() + "'")));
   }
   return Writer(writer, WriterDeleter{shared_from_this()});
 }
 
 Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
-                                                    fd::DataReaderListener* listener, std::optional<ClientId> only) {
+                                                    fd::DataReaderListener* listener,
+                                                    std::optional<std::uint64_t> only) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataReaderQos qos;

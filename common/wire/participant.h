@@ -45,16 +45,19 @@ class Participant : public std::enable_shared_from_this<Participant> {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  // The listener is called from creation until the entity is deleted, and must outlive it. `partition`: of a
-  // topic of robots, the robot's name, which counts only with security. kPermissionDenied: the permissions of this
-  // participant do not allow it.
+  // The listener is called from creation until the entity is deleted, and must outlive it. `partitions`: of a
+  // topic of robots, the robot's name, which counts only with security; none: the default one. kPermissionDenied: the
+  // permissions of this participant do not allow it.
   [[nodiscard]] Result<Writer> MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
-                                          fd::DataWriterListener* listener, const std::string& partition = {});
-  // `only`: of a topic of replies, what is in the partition of this client.
+                                          fd::DataWriterListener* listener,
+                                          const std::vector<std::string>& partitions = {});
+  // `only`: of a topic of replies, what is in the partition of this client; of one of shares, of this robot.
   [[nodiscard]] Result<Reader> MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
-                                          fd::DataReaderListener* listener, std::optional<ClientId> only = {});
+                                          fd::DataReaderListener* listener, std::optional<std::uint64_t> only = {});
 
   [[nodiscard]] const WireOptions& options() const { return options_; }
+  // Whether its topics of shares have a writer for each (partitions.h).
+  [[nodiscard]] bool has_shares() const { return !secure() && options_.discovery_servers.empty(); }
   [[nodiscard]] const GuardReport& guard() const { return *guard_; }
   [[nodiscard]] PeerWatch& peers() const { return *peers_; }
 
@@ -63,9 +66,9 @@ class Participant : public std::enable_shared_from_this<Participant> {
       : options_(options), peers_(PeerWatch::Make(!options.security.empty())) {}
   [[nodiscard]] bool secure() const { return !options_.security.empty(); }
   [[nodiscard]] Status NotMade(const std::string& what) const;
-  [[nodiscard]] fd::Publisher* PublisherFor(const std::string& partition);
+  [[nodiscard]] fd::Publisher* PublisherFor(const std::vector<std::string>& partitions);
   [[nodiscard]] fd::Subscriber* SubscriberFor(const std::string& partition);
-  [[nodiscard]] std::string PartitionToRead(Partitions partitions, std::optional<ClientId> only) const;
+  [[nodiscard]] std::string PartitionToRead(Partitions partitions, std::optional<std::uint64_t> only) const;
   [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
 
   const WireOptions options_;
@@ -76,8 +79,8 @@ class Participant : public std::enable_shared_from_this<Participant> {
   // once in one participant. Listeners must not create or delete endpoints.
   Mutex endpoints_;
   Mutex mutex_;
-  std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);    // By partition.
-  std::map<std::string, fd::Subscriber*> subscribers_ CAIRN_GUARDED_BY(mutex_);  // By partition.
+  std::map<std::vector<std::string>, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);  // By partitions.
+  std::map<std::string, fd::Subscriber*> subscribers_ CAIRN_GUARDED_BY(mutex_);             // By partition.
   std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
 };
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "common/wire/bounds.h"
 #include "common/wire/convert.h"
@@ -24,12 +25,13 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
  public:
   [[nodiscard]] static Result<std::unique_ptr<Publication<Value>>> Make(const std::shared_ptr<Participant>& participant,
-                                                                        const std::string& partition) {
+                                                                        const std::vector<std::string>& partitions) {
     auto made = std::make_unique<DdsPublication>();
     Result<Participant::Writer> writer =
-        participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get(), partition);
+        participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get(), partitions);
     if (!writer) return tl::unexpected(writer.error());
     made->participant_ = participant;
+    made->partitions_ = partitions;
     made->writer_ = std::move(*writer);
     return made;
   }
@@ -141,7 +143,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     constexpr std::chrono::seconds kLongestSearch{2};  // A reader on a host that was lost never matches the new writer.
     const auto now = std::chrono::steady_clock::now();
     if (!successor_) {
-      Result<Participant::Writer> writer = participant_->MakeWriter(Topic<Value>::kProfile, type_, this);
+      Result<Participant::Writer> writer = participant_->MakeWriter(Topic<Value>::kProfile, type_, this, partitions_);
       if (!writer) return false;
       successor_ = std::move(*writer);
       successor_made_ = now;
@@ -173,6 +175,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
   std::atomic<int> matched_ = 0;
   std::shared_ptr<Participant> participant_;
+  std::vector<std::string> partitions_;
   fd::TypeSupport type_{new typename Topic<Value>::Type()};
   Mutex mutex_;
   std::map<Key, Sample<Wire>> live_ CAIRN_GUARDED_BY(mutex_);  // Where keys are retired: the last sample of each.

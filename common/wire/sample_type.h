@@ -4,7 +4,7 @@
 // - keys are computed under a lock (the generated ones share a buffer: wrong keys from two threads,
 //   measured);
 // - no type objects are announced (Cyclone DDS would refuse the topic);
-// - replies to other clients are skipped by their first eight bytes.
+// - replies to other clients, and what is about other robots, are skipped by their first eight bytes.
 // This header uses the Fast DDS 2.x API; include it only inside common/wire.
 #pragma once
 
@@ -26,21 +26,20 @@ template <typename Wire>
 struct Sample {
   Wire value;
   Decoding decoding = Decoding::kDecoded;
-  std::optional<ClientId> only;  // Set by a reader of replies: the client whose replies it reads.
+  std::optional<std::uint64_t> only;  // Set by a reader of one client's replies, or of one robot.
 };
 
-// Returns the client id at the start of a serialised reply; nothing if the reply is too short or not plain
-// CDR.
-[[nodiscard]] inline std::optional<ClientId> PeekClient(const std::uint8_t* payload, std::uint32_t size) {
+// Returns the number at the start of a serialised sample; nothing if the sample is too short or not plain CDR.
+[[nodiscard]] inline std::optional<std::uint64_t> PeekFirstNumber(const std::uint8_t* payload, std::uint32_t size) {
   constexpr std::uint8_t kCdrLittleEndian = 1;
   constexpr std::uint32_t kEncapsulationBytes = 4;
-  if (size < kEncapsulationBytes + sizeof(ClientId) || payload[0] != 0 || payload[1] > kCdrLittleEndian) return {};
-  ClientId client = 0;
-  for (std::uint32_t i = 0; i < sizeof(ClientId); ++i) {
-    const std::uint32_t at = payload[1] == kCdrLittleEndian ? sizeof(ClientId) - 1 - i : i;
-    client = client << 8 | payload[kEncapsulationBytes + at];
+  if (size < kEncapsulationBytes + sizeof(std::uint64_t) || payload[0] != 0 || payload[1] > kCdrLittleEndian) return {};
+  std::uint64_t number = 0;
+  for (std::uint32_t i = 0; i < sizeof(std::uint64_t); ++i) {
+    const std::uint32_t at = payload[1] == kCdrLittleEndian ? sizeof(std::uint64_t) - 1 - i : i;
+    number = number << 8 | payload[kEncapsulationBytes + at];
   }
-  return client;
+  return number;
 }
 
 template <typename Wire, typename Generated>
@@ -71,8 +70,8 @@ class SampleType : public eprosima::fastdds::dds::TopicDataType {
     sample.decoding = Decoding::kUndecodable;
     if (payload->length > kMaxSampleBytes) return true;
     if (sample.only) {
-      const std::optional<ClientId> client = PeekClient(payload->data, payload->length);
-      if (client && client != sample.only) {
+      const std::optional<std::uint64_t> first = PeekFirstNumber(payload->data, payload->length);
+      if (first && first != sample.only) {
         sample.decoding = Decoding::kForeign;
         return true;
       }

@@ -26,7 +26,7 @@ class DdsSubscription final : public Subscription {
   [[nodiscard]] static Result<std::unique_ptr<Subscription>> Make(const std::shared_ptr<Participant>& participant,
                                                                   std::function<void(Value&&)> on_value,
                                                                   SubscriptionEvents events,
-                                                                  std::optional<ClientId> only = {}) {
+                                                                  std::optional<std::uint64_t> only = {}) {
     auto made = std::make_unique<DdsSubscription>(std::move(on_value), std::move(events), only);
     Result<Participant::Reader> reader =
         participant->MakeReader(Topic<Value>::kProfile, made->type_, &made->listener_, only);
@@ -37,7 +37,7 @@ class DdsSubscription final : public Subscription {
     return made;
   }
 
-  DdsSubscription(std::function<void(Value&&)> on_value, SubscriptionEvents events, std::optional<ClientId> only)
+  DdsSubscription(std::function<void(Value&&)> on_value, SubscriptionEvents events, std::optional<std::uint64_t> only)
       : on_value_(std::move(on_value)), events_(std::move(events)), only_(only) {}
 
   ~DdsSubscription() override {
@@ -138,7 +138,7 @@ class DdsSubscription final : public Subscription {
 
   const std::function<void(Value&&)> on_value_;
   const SubscriptionEvents events_;
-  const std::optional<ClientId> only_;
+  const std::optional<std::uint64_t> only_;
   std::atomic<std::uint64_t> refused_ = 0;
   std::shared_ptr<Participant> participant_;
   const fd::TypeSupport type_{new typename Topic<Value>::Type()};

@@ -64,20 +64,21 @@ template <>
 struct Topic<OdometrySample> {
   using Wire = v1::Odometry;
   using Type = SampleType<Wire, v1::OdometryPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 20,
+  // A sample is always on its way, so each period costs the server a heartbeat and an acknowledgement of each robot.
+  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 50,
                                          Partitions::kRobots};
 };
 template <>
 struct Topic<PoseReport> {
   using Wire = v1::PoseReport;
   using Type = SampleType<Wire, v1::PoseReportPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/pose", false, 1, 16, 4096, 1.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/pose", false, 1, 16, 4096, 1.0, false, 20, Partitions::kShares};
 };
 template <>
 struct Topic<Ledger> {
   using Wire = v1::Ledger;
   using Type = SampleType<Wire, v1::LedgerPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/ledger", true, 1, 1, 4096, 0.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/ledger", true, 1, 1, 4096, 0.0, false, 20, Partitions::kShares};
 };
 template <>
 struct Topic<MapInfo> {

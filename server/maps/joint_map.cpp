@@ -268,9 +268,11 @@ std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, con
   const auto number_of = [last](const Layer& layer) {
     return last == nullptr ? std::uint8_t{0} : last->NumberOf(layer.first);
   };
-  const auto older = [last, &number_of](const Layer& layer) {
-    return
-        [last, number = number_of(layer)](std::size_t cell) { return number == 0 || last->numbers()[cell] != number; };
+  static constexpr std::array<std::uint8_t, kTileArea> kNobody{};
+  const std::uint8_t* const lasts = last == nullptr ? kNobody.data() : last->numbers().data();
+  const auto older = [lasts, &number_of](const Layer& layer) {
+    const std::uint8_t number = number_of(layer);
+    return [lasts, number, any = number == 0](std::size_t cell) { return any | (lasts[cell] != number); };
   };
   auto sum = std::make_shared<slam::GridChunk>(UnseenChunk());
   for (const auto& [before, layer] : past) AddLater(*sum, *layer->second, most_past_, older(*layer));
@@ -280,7 +282,7 @@ std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, con
   const auto add_last = [&](const Layer& layer) {
     const std::uint8_t number = number_of(layer);
     if (number == 0) return;
-    AddLater(*sum, *layer.second, most_past_, [&](std::size_t cell) { return last->numbers()[cell] == number; });
+    AddLater(*sum, *layer.second, most_past_, [&](std::size_t cell) { return lasts[cell] == number; });
   };
   for (const auto& [before, layer] : past) add_last(*layer);
   for (const Layer* const layer : present) add_last(*layer);

@@ -111,7 +111,7 @@ TEST_F(RecordSourceTest, WithoutSamplesNoScansAreRead) {
   const auto robots = MakeBus("robots");
   const auto scans = Must(robots->Advertise<ScanSample>());
   const auto poses = Must(robots->Advertise<PoseReport>());
-  EXPECT_TRUE(Eventually([&] { return poses->matched() == 1; }));
+  EXPECT_TRUE(Eventually([&] { return poses->matched() > 0; }));
   EXPECT_EQ(scans->matched(), 0);
 }
 

@@ -175,9 +175,9 @@ TEST(SampleType, SkipsRepliesToOtherClients) {
 TEST(SampleType, PeeksTheClientInBothByteOrders) {
   const std::uint8_t little[] = {0, 1, 0, 0, 8, 7, 6, 5, 4, 3, 2, 1};
   const std::uint8_t big[] = {0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8};
-  EXPECT_EQ(PeekClient(little, sizeof(little)), 0x0102030405060708U);
-  EXPECT_EQ(PeekClient(big, sizeof(big)), 0x0102030405060708U);
-  EXPECT_EQ(PeekClient(big, 11), std::nullopt);
+  EXPECT_EQ(PeekFirstNumber(little, sizeof(little)), 0x0102030405060708U);
+  EXPECT_EQ(PeekFirstNumber(big, sizeof(big)), 0x0102030405060708U);
+  EXPECT_EQ(PeekFirstNumber(big, 11), std::nullopt);
 }
 
 TEST(SampleType, KeysOfTheTileFitTheHandleUnhashed) {

@@ -90,10 +90,10 @@ TEST_F(BusPair, CarriesOdometry) {
   ExpectArrives(ExtremeOdometry());
 }
 TEST_F(BusPair, CarriesPoses) {
-  ExpectArrives(ExtremePose());
+  ExpectArrives(ExtremePose(), static_cast<int>(kRobotShares));
 }
 TEST_F(BusPair, CarriesLedgers) {
-  ExpectArrives(ExtremeLedger());
+  ExpectArrives(ExtremeLedger(), static_cast<int>(kRobotShares));
 }
 TEST_F(BusPair, CarriesMapInfo) {
   ExpectArrives(ExtremeMapInfo());
@@ -184,6 +184,59 @@ TEST_F(BusPair, RepliesToOthersAreNotSent) {
   EXPECT_EQ(bystander->datagrams_refused(), 0U);
 }
 
+// While every robot was sent the poses of all, the work of a fleet grew with the square of its size.
+TEST_F(BusPair, WhatIsAboutOtherRobotsIsNotSent) {
+  constexpr std::size_t kPoses = 3000;
+  constexpr NameId kMine = 1, kOther = 2, kOfMyShare = kMine + kRobotShares;
+  const std::unique_ptr<Bus> bystander = MakeBus("bystander");
+  const auto poses = Must(sender_->Advertise<PoseReport>());
+  const auto ledgers = Must(sender_->Advertise<Ledger>());
+  Inbox<PoseReport> mine, theirs, everybodys;
+  Inbox<Ledger> my_ledgers;
+  const auto of_me = Must(receiver_->SubscribeRobot<PoseReport>(kMine, mine.Sink()));
+  const auto ledgers_of_me = Must(receiver_->SubscribeRobot<Ledger>(kMine, my_ledgers.Sink()));
+  const auto of_other = Must(bystander->SubscribeRobot<PoseReport>(kOther, theirs.Sink()));
+  ASSERT_TRUE(Eventually([&] { return of_me->matched() + ledgers_of_me->matched() + of_other->matched() == 3; }));
+  ASSERT_TRUE(Eventually([&] { return poses->matched() == 2 && ledgers->matched() == 1; }));
+  const std::uint64_t before = bystander->bytes_received();
+  const std::uint64_t receiver_before = receiver_->bytes_received();
+  PoseReport pose = ExtremePose();
+  for (std::size_t count = 1; count <= kPoses; ++count) {
+    pose.robot_id = kMine;
+    ASSERT_TRUE(poses->Publish(pose));
+    ASSERT_TRUE(mine.WaitFor(count));  // The writer keeps one of each robot.
+  }
+  pose.robot_id = kOther;
+  ASSERT_TRUE(poses->Publish(pose));
+  ASSERT_TRUE(theirs.WaitFor(1));
+  const std::uint64_t to_receiver = receiver_->bytes_received() - receiver_before;
+  EXPECT_LT(10 * (bystander->bytes_received() - before), to_receiver);
+
+  // A share has more than one robot: the others are left out.
+  for (const NameId robot : {kOfMyShare, kMine}) {
+    pose.robot_id = robot;
+    ASSERT_TRUE(poses->Publish(pose));
+    Ledger ledger = ExtremeLedger();
+    ledger.robot_id = robot;
+    ASSERT_TRUE(ledgers->Publish(ledger));
+  }
+  ASSERT_TRUE(mine.WaitFor(kPoses + 1));
+  ASSERT_TRUE(my_ledgers.WaitFor(1));
+  for (const PoseReport& received : mine.values()) EXPECT_EQ(received.robot_id, kMine);
+  EXPECT_EQ(my_ledgers.values().front().robot_id, kMine);
+  EXPECT_EQ(of_me->refused() + ledgers_of_me->refused(), 0U);
+
+  const auto of_all = Must(bystander->Subscribe<PoseReport>(everybodys.Sink()));
+  constexpr int kWriters = kRobotShares;
+  ASSERT_TRUE(Eventually([&] { return of_all->matched() == kWriters && poses->matched() == kWriters + 2; }));
+  for (const NameId robot : {kMine, kOther, kOfMyShare}) {
+    pose.robot_id = robot;
+    ASSERT_TRUE(poses->Publish(pose));
+  }
+  EXPECT_TRUE(everybodys.WaitFor(3));
+  EXPECT_EQ(bystander->datagrams_refused(), 0U);
+}
+
 TEST_F(BusPair, AReceiverThatThrowsLosesOneSampleOnly) {
   Inbox<PoseReport> inbox;
   const auto keep = inbox.Sink();
@@ -192,7 +245,10 @@ TEST_F(BusPair, AReceiverThatThrowsLosesOneSampleOnly) {
     keep(std::move(report));
   }));
   const auto publication = Must(sender_->Advertise<PoseReport>());
-  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  ASSERT_TRUE(Eventually([&] {
+    constexpr int kWriters = kRobotShares;
+    return publication->matched() == kWriters && subscription->matched() == kWriters;
+  }));
   PoseReport report = ExtremePose();
   for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
     report.scan_sequence = sequence;
@@ -237,7 +293,7 @@ TEST(Bus, ManyThreadsMakeAndDeleteEndpointsAtOnce) {
   constexpr int kThreads = 40;
   constexpr int kRounds = 5;
   const auto far = MakeBus("far");
-  const auto readers = far->Subscribe<PoseReport>([](PoseReport&&) {}, {});
+  const auto readers = far->Subscribe<Job>([](Job&&) {}, {});
   auto done = std::make_shared<std::promise<void>>();
   auto finished = done->get_future();
   std::thread([done, bus = std::shared_ptr<Bus>(MakeBus("near"))] {
@@ -245,10 +301,10 @@ TEST(Bus, ManyThreadsMakeAndDeleteEndpointsAtOnce) {
     for (int i = 0; i < kThreads; ++i) {
       threads.emplace_back([&bus = *bus] {
         for (int round = 0; round < kRounds; ++round) {
-          const auto writer = bus.Advertise<PoseReport>();
+          const auto writer = bus.Advertise<Job>();
+          const auto jobs = bus.Subscribe<Job>([](Job&&) {}, {});
           const auto poses = bus.Subscribe<PoseReport>([](PoseReport&&) {}, {});
-          const auto ledgers = bus.Subscribe<Ledger>([](Ledger&&) {}, {});
-          EXPECT_TRUE(writer && poses && ledgers);
+          EXPECT_TRUE(writer && jobs && poses);
         }
       });
     }
@@ -274,14 +330,14 @@ TEST(Bus, EndpointsGoWhileLeasesAreWatched) {
   std::thread([done, options] {
     {
       const auto watcher = MakeBus("watcher");
-      const auto subscription = Must(watcher->Subscribe<Ledger>([](Ledger&&) {}));
+      const auto subscription = Must(watcher->Subscribe<Job>([](Job&&) {}));
       std::vector<std::jthread> peers;
       for (int i = 0; i < kPeers; ++i) {
         peers.emplace_back([&, i] {
           const auto peer = MakeBus("peer" + std::to_string(i), options);
           for (int round = 0; round < kRounds; ++round) {
-            std::vector<std::unique_ptr<Publication<Ledger>>> publications;
-            for (int k = 0; k < 4; ++k) publications.push_back(Must(peer->Advertise<Ledger>()));
+            std::vector<std::unique_ptr<Publication<Job>>> publications;
+            for (int k = 0; k < 4; ++k) publications.push_back(Must(peer->Advertise<Job>()));
             EXPECT_TRUE(Eventually([&] { return publications.back()->matched() > 0; }, std::chrono::seconds(2)));
           }
         });

@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/wire/partitions.h"
 #include "common/wire/rtps_datagram.h"
 #include "tests/common/wire/sample_values.h"
 #include "tests/loopback.h"
@@ -31,10 +32,11 @@ class Keys : public ::testing::Test {
   const std::unique_ptr<Bus> receiver_ = MakeBus("receiver");
 };
 
+// Of one share, so that one writer has all of them.
 template <typename Value>
 Value OfRobot(std::uint64_t robot) {
   Value value;
-  value.robot_id = robot;
+  value.robot_id = kRobotShares * robot;
   return value;
 }
 template <>
@@ -45,11 +47,15 @@ Job OfRobot<Job>(std::uint64_t robot) {
 }
 template <typename Value>
 std::uint64_t KeyOf(const Value& value) {
-  return value.robot_id;
+  return value.robot_id / kRobotShares;
 }
 std::uint64_t KeyOf(const Job& job) {
   return job.id;
 }
+
+// That a reader of everything matches.
+template <typename Value>
+constexpr int kWriters = std::is_same_v<Value, PoseReport> || std::is_same_v<Value, Ledger> ? int{kRobotShares} : 1;
 
 using Keyed = ::testing::Types<SessionState, PoseReport, Ledger, Job>;
 TYPED_TEST_SUITE(Keys, Keyed);
@@ -60,7 +66,8 @@ TYPED_TEST(Keys, ThatAreRetiredMakeRoomForOthers) {
   const auto subscription = Must(this->receiver_->template Subscribe<TypeParam>([&](TypeParam&& value) {
     if (KeyOf(value) != kLasting) ++received;
   }));
-  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  ASSERT_TRUE(Eventually(
+      [&] { return publication->matched() == kWriters<TypeParam> && subscription->matched() == kWriters<TypeParam>; }));
   ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(kLasting)));
   std::uint64_t robot = 1;
   for (; robot <= kRobots; ++robot) {
@@ -90,7 +97,8 @@ TYPED_TEST(Keys, ALateJoinerGetsWhatWasWrittenLongAgo) {
   const auto publication = Must(this->sender_->template Advertise<TypeParam>());
   Inbox<TypeParam> first;
   const auto subscription = Must(this->receiver_->template Subscribe<TypeParam>(first.Sink()));
-  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  ASSERT_TRUE(Eventually(
+      [&] { return publication->matched() == kWriters<TypeParam> && subscription->matched() == kWriters<TypeParam>; }));
   ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(kLasting)));
   for (std::int64_t count = 1; count <= 2 * kMaxGap; ++count) {
     ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(1)));
@@ -107,7 +115,9 @@ TYPED_TEST(Keys, ALateJoinerGetsWhatWasWrittenLongAgo) {
     return std::any_of(values.begin(), values.end(), [&](const TypeParam& v) { return KeyOf(v) == key; });
   };
   if constexpr (std::is_same_v<TypeParam, PoseReport>) {  // A topic without history.
-    ASSERT_TRUE(Eventually([&] { return publication->matched() == 2 && late_subscription->matched() == 1; }));
+    ASSERT_TRUE(Eventually([&] {
+      return publication->matched() == 2 * kWriters<TypeParam> && late_subscription->matched() == kWriters<TypeParam>;
+    }));
   } else {
     EXPECT_TRUE(Eventually([&] { return has(kLasting) && has(1); }));
   }
@@ -145,7 +155,8 @@ TEST(Numbers, ThatWereLeftOutBeforeCostNothing) {
   const auto sender = MakeBus("sender"), receiver = MakeBus("receiver");
   const auto publication = Must(sender->Advertise<Ledger>());
   const auto subscription = Must(receiver->Subscribe<Ledger>([](Ledger&&) {}));
-  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  ASSERT_TRUE(Eventually(
+      [&] { return publication->matched() == kWriters<Ledger> && subscription->matched() == kWriters<Ledger>; }));
   ASSERT_TRUE(publication->Publish(OfRobot<Ledger>(kLasting)));
   constexpr int kSamples = 50;
   const auto processor_time = [&] {
@@ -186,7 +197,9 @@ TEST(Numbers, OfAWriterBeginAnewAndNothingIsLost) {
     if (pose.scan_sequence != last + 1) ++out_of_order;
     last = pose.scan_sequence;
   }));
-  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  ASSERT_TRUE(Eventually([&] {
+    return publication->matched() == kWriters<PoseReport> && subscription->matched() == kWriters<PoseReport>;
+  }));
   PoseReport pose = OfRobot<PoseReport>(1);
   const std::uint64_t poses = 5 * kFew;
   while (++pose.scan_sequence <= poses) {
@@ -199,7 +212,7 @@ TEST(Numbers, OfAWriterBeginAnewAndNothingIsLost) {
   }
   EXPECT_TRUE(Eventually([&] { return last == poses; }));
   EXPECT_EQ(out_of_order, 0U);
-  EXPECT_EQ(publication->matched(), 1);
+  EXPECT_EQ(publication->matched(), kWriters<PoseReport>);
 }
 
 TileSample ChangeOf(NameId site, int x, std::uint64_t version, bool deleted = false) {
