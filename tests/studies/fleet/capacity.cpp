@@ -11,6 +11,7 @@
 
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/stopwatch.h"
+#include "tests/temp_directory.h"
 
 namespace cairn::studies {
 namespace {
@@ -63,7 +64,8 @@ struct Carried {
 
 // A server of its own, so that its memory is that of these robots. Nothing if the programs gave up.
 std::optional<Carried> Carry(Report& report, int robots, double seconds) {
-  const LiveServer server;
+  const TempDirectory state;  // What a server stores in memory would count as memory of the robots.
+  const LiveServer server({"--state", state.path().string()});
   PinToCore(server.pid(), FirstAllowedCore());
   const int pid = std::stoi(server.pid());
   const double before_mib = ResidentMibOf(pid);

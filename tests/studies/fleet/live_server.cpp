@@ -1,5 +1,6 @@
 #include "tests/studies/fleet/live_server.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -20,8 +21,9 @@ std::vector<std::string> CommandLine(const std::vector<std::string>& arguments,
                                      const std::vector<std::string>& environment) {
   std::vector<std::string> line = {"/usr/bin/env"};
   line.insert(line.end(), environment.begin(), environment.end());
-  line.insert(line.end(), {ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--state",
-                           ":memory:", "--set", "server.log_level=warn"});
+  line.insert(line.end(), {ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--set",
+                           "server.log_level=warn"});
+  if (std::ranges::find(arguments, "--state") == arguments.end()) line.insert(line.end(), {"--state", ":memory:"});
   line.insert(line.end(), arguments.begin(), arguments.end());
   return line;
 }

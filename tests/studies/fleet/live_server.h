@@ -24,7 +24,8 @@ namespace cairn::studies {
 
 class LiveServer {
  public:
-  // Returns once it answers. `arguments` of cairnd come last; `environment`: NAME=VALUE, beside this program's own.
+  // Returns once it answers. `arguments` of cairnd come last; without a `--state` among them, its state
+  // is kept in memory. `environment`: NAME=VALUE, beside this program's own.
   explicit LiveServer(const std::vector<std::string>& arguments = {}, const std::vector<std::string>& environment = {});
 
   [[nodiscard]] client::QueryClient& queries() { return *queries_; }
