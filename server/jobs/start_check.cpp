@@ -26,13 +26,14 @@ void StartCheck::Tick() {
 }
 
 void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::shared_ptr<Watched>& watched) const {
-  const RobotStatus status = session->record().snapshot().status;
-  const auto site = atlas_.Find(status.session.site);
-  if (site == nullptr || !status.pose.localized) return;
-  const auto ask = [session, comparing = std::make_shared<Comparing>(watched)](const GridAgreement& agreement) {
-    if (!comparing->judgement().Refuses(agreement)) return false;
+  const auto now = session->record().snapshot();
+  const auto site = atlas_.Find(now.status.session.site);
+  if (site == nullptr || !now.status.pose.localized || now.path.blocks() == 0) return;
+  const auto ask = [session, way_m = watched->compared_at_m,
+                    comparing = std::make_shared<Comparing>(watched)](const GridAgreement& agreement) {
+    if (!comparing->judgement().Refuses(agreement, way_m)) return false;
     const std::string why =
-        fmt::format("its start contradicts the map: {:.0f} % of the walls that it sees are free for others",
+        fmt::format("its start contradicts the map: {:.0f} % of the walls that it or others see are free for the other",
                     100.0 * agreement.contradicted_share());
     const LogContext context(AboutRobot(session->record().state().robot, session->record().state().site));
     spdlog::warn("robot {}: {}. It is not localized, and not shown, until it is joined with the map",
@@ -40,7 +41,7 @@ void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::sha
     session->RefuseStart(why);
     return true;
   };
-  site->CheckStart(session->id(), status.pose.T_map_robot, ask);
+  site->CheckStart(session->id(), now.path.block(0).front().T_map_robot, ask);
 }
 
 }  // namespace cairn::server

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <utility>
+#include <vector>
 
 namespace cairn::server {
 namespace {
@@ -13,7 +15,7 @@ using slam::OccupancyGrid;
 
 // In units of GridChunk::log_odds: three hits, one hit, five rays that passed.
 constexpr int kOccupied = 200, kHit = 80, kFree = -150;
-constexpr std::size_t kMostCells = 1000;  // That are compared; of more, every second, third, ...
+constexpr std::size_t kMostCells = 1000;  // Of each of the two grids that are compared.
 constexpr double kStepM = 0.15, kStepRad = 0.03;
 
 struct Cell {
@@ -71,28 +73,51 @@ class Known {
   std::vector<std::uint8_t> cells_;
 };
 
+// Of many walls, every second, third, ...
+std::vector<Eigen::Vector2d> Thinned(std::vector<Eigen::Vector2d> walls) {
+  const std::size_t stride = walls.size() / kMostCells + 1;
+  std::vector<Eigen::Vector2d> some;
+  some.reserve(walls.size() / stride + 1);
+  for (std::size_t i = 0; i < walls.size(); i += stride) some.push_back(walls[i]);
+  return some;
+}
+
 }  // namespace
 
-GridAgreement CompareGrids(const OccupancyGrid::Chunks& grid, const OccupancyGrid::Chunks& others, const Pose2& centre,
+GridAgreement CompareGrids(const OccupancyGrid::Chunks& grid, const OccupancyGrid::Chunks& others, const Pose2& start,
                            double resolution_m) {
-  const Eigen::Vector2d c = centre.translation();
+  const Eigen::Vector2d c = start.translation();
   const auto cell_of = [&](const Eigen::Vector2d& p) {
     return Cell{static_cast<int>(std::floor(p.x() / resolution_m)), static_cast<int>(std::floor(p.y() / resolution_m))};
   };
-  std::vector<Eigen::Vector2d> walls;  // As seen from the centre.
+  const auto from_start = [&](Cell cell) -> Eigen::Vector2d {
+    return Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5) * resolution_m - c;
+  };
+  std::vector<Eigen::Vector2d> own;  // Walls as seen from the start, and `theirs` likewise.
   double reach_m = 0.0;
   ForEachCell(grid, [&](Cell cell, int log_odds) {
     if (log_odds < kOccupied) return;
-    walls.push_back(Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5) * resolution_m - c);
-    reach_m = std::max(reach_m, walls.back().norm());
+    own.push_back(from_start(cell));
+    reach_m = std::max(reach_m, own.back().norm());
   });
+  if (own.empty()) return {};
 
-  reach_m += 2.0 * GridAgreement::kReachM;
-  const Eigen::Vector2d corner(reach_m, reach_m);
-  const Known known(others, cell_of(c - corner), cell_of(c + corner),
-                    static_cast<int>(std::lround(GridAgreement::kNearM / resolution_m)));
+  const auto around = [&](const OccupancyGrid::Chunks& of, double within_m) {
+    const Eigen::Vector2d corner(within_m, within_m);
+    return Known(of, cell_of(c - corner), cell_of(c + corner),
+                 static_cast<int>(std::lround(GridAgreement::kNearM / resolution_m)));
+  };
+  const double others_m = reach_m + 2.0 * GridAgreement::kReachM;
+  const Known of_others = around(others, others_m), of_robot = around(grid, reach_m);
+  std::vector<Eigen::Vector2d> theirs;
+  ForEachCell(others, [&](Cell cell, int log_odds) {
+    if (log_odds < kOccupied) return;
+    const Eigen::Vector2d wall = from_start(cell);
+    if (wall.norm() <= others_m) theirs.push_back(wall);
+  });
+  own = Thinned(std::move(own));
+  theirs = Thinned(std::move(theirs));
 
-  const std::size_t stride = walls.size() / kMostCells + 1;
   const auto turns = static_cast<int>(std::lround(GridAgreement::kReachRad / kStepRad));
   const auto steps = static_cast<int>(std::lround(GridAgreement::kReachM / kStepM));
   GridAgreement best;
@@ -102,8 +127,13 @@ GridAgreement CompareGrids(const OccupancyGrid::Chunks& grid, const OccupancyGri
       for (int x = -steps; x <= steps; ++x) {
         const Eigen::Vector2d shift = kStepM * Eigen::Vector2d(x, y);
         GridAgreement agreement;
-        for (std::size_t i = 0; i < walls.size(); i += stride) {
-          const Known::What what = known(cell_of(R * walls[i] + shift + c));
+        for (const Eigen::Vector2d& wall : own) {
+          const Known::What what = of_others(cell_of(R * wall + shift + c));
+          agreement.compared += what != Known::kNothing ? 1 : 0;
+          agreement.contradicted += what == Known::kIsFree ? 1 : 0;
+        }
+        for (const Eigen::Vector2d& wall : theirs) {
+          const Known::What what = of_robot(cell_of(R.transpose() * (wall - shift) + c));
           agreement.compared += what != Known::kNothing ? 1 : 0;
           agreement.contradicted += what == Known::kIsFree ? 1 : 0;
         }

@@ -1,7 +1,7 @@
 // How what one robot has drawn agrees with what others have drawn at the same place: whether its walls lie where the
-// others have seen that there is nothing. For finding out that a robot does not start where somebody says it does.
-// Because a start is never exact, the grid is moved by up to kReachM and kReachRad to where it agrees best. Stateless,
-// thread-safe.
+// others have seen that there is nothing, or theirs where it has, as if it had driven through them. For finding out
+// that a robot does not start where somebody says it does. Because a start is never exact, the grid is moved by up to
+// kReachM and kReachRad to where it agrees best. Stateless, thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,10 @@ struct GridAgreement {
   static constexpr double kReachM = 0.6, kReachRad = 0.12;
   static constexpr double kNearM = 0.2;  // From a wall, at most, for being the same wall.
 
-  std::size_t compared = 0;      // Occupied cells of the robot of which the others know something.
-  std::size_t contradicted = 0;  // Those of them that are free for the others, with nothing occupied near them.
+  // Occupied cells of each of the two of which the other knows something, and those of them that are free for the
+  // other, with nothing occupied near them.
+  std::size_t compared = 0;
+  std::size_t contradicted = 0;
 
   [[nodiscard]] double contradicted_share() const {
     return compared == 0 ? 0.0 : static_cast<double>(contradicted) / static_cast<double>(compared);
@@ -33,9 +35,10 @@ struct GridAgreement {
   }
 };
 
-// Both grids in one frame, with cells of the same size. `grid` is turned around `centre`, where its robot is.
+// Both grids in one frame, with cells of the same size. `grid` is turned around `start`, where its robot has begun: an
+// error of its heading there moves what it sees some metres on by more than kReachM.
 [[nodiscard]] GridAgreement CompareGrids(const slam::OccupancyGrid::Chunks& grid,
-                                         const slam::OccupancyGrid::Chunks& others, const Pose2& centre,
+                                         const slam::OccupancyGrid::Chunks& others, const Pose2& start,
                                          double resolution_m);
 
 }  // namespace cairn::server

@@ -94,11 +94,11 @@ void Site::Join(Member member) {
   });
 }
 
-void Site::CheckStart(SessionId session, const Pose2& T_map_robot, Refuses refuses) {
-  Run([session, T_map_robot, refuses = std::move(refuses)](Site& site) {
+void Site::CheckStart(SessionId session, const Pose2& T_map_robot_start, Refuses refuses) {
+  Run([session, T_map_robot_start, refuses = std::move(refuses)](Site& site) {
     GridAgreement agreement;
     if (!site.switch_)
-      agreement = CompareGrids(site.joint_.ChunksOf(session), site.joint_.DrawnBefore(session), T_map_robot,
+      agreement = CompareGrids(site.joint_.ChunksOf(session), site.joint_.DrawnBefore(session), T_map_robot_start,
                                site.resolution_m_);
     if (refuses(agreement)) site.SetHidden(session);
   });

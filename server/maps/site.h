@@ -114,9 +114,9 @@ class Site : public std::enable_shared_from_this<Site> {
   void Hide(SessionId session);
   // Compares what the session has drawn with what earlier ones have drawn there. `refuses` is asked once, on the
   // strand; if it says so, what the session draws is not shown from then on, as that of a fragment. While the map is
-  // being switched nothing is compared. The robot is at `T_map_robot`.
+  // being switched nothing is compared. The robot has begun at `T_map_robot_start`.
   using Refuses = std::function<bool(const GridAgreement&)>;
-  void CheckStart(SessionId session, const Pose2& T_map_robot, Refuses refuses);
+  void CheckStart(SessionId session, const Pose2& T_map_robot_start, Refuses refuses);
   // Changes that wait for the strand are merged: the newest form of each chunk is kept, so that a site that is slow
   // holds at most the chunks that its sessions have.
   void Change(GridChange&& change);

@@ -30,7 +30,7 @@ struct SessionMaterial {
   // Whether the place of its start in the map is known: somebody has said where it is, the session began the map, or a
   // map version has joined it (maps/robot_grid.h).
   bool start_known = true;
-  bool start_found = false;  // It began without one, and a map version has joined it.
+  bool start_found = false;  // It began without one, or that was refused; and a map version has joined it.
   bool joinable = true;      // See SessionRecord::Joining.
   slam::Mapper::LostView lost{};
   // With which the session itself would make the map of a PlaceSuggested ready for use (KnownGridOf).

@@ -242,7 +242,7 @@ void SessionEstimator::Drive(const Pose2& T_map_robot) {
 
 void SessionEstimator::TellJoining() {
   const bool joinable = pipeline_.mapper().follows_paths();
-  std::string why = start_refused_;
+  std::string why = fragment_ ? start_refused_ : std::string();
   if (fragment_ && why.empty() && !joinable)
     why =
         "not joined with the map of its site: the filter that it is run with cannot continue in a map in which a job "
@@ -256,7 +256,7 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
                .snapshot = pipeline_.mapper().Snapshot(),
                .grid_options = pipeline_.mapper().grid().options(),
                .start_known = !fragment_,
-               .start_found = !fragment_ && began_as_fragment_,
+               .start_found = !fragment_ && (began_as_fragment_ || !start_refused_.empty()),
                .joinable = pipeline_.mapper().follows_paths(),
                .lost = pipeline_.mapper().SeenWhileLost(),
                .place_search = options_.recovery.place,

@@ -163,7 +163,7 @@ class SessionEstimator {
   bool fragment_ = false;
   const slam::MapperOptions options_;
   const std::shared_ptr<SharedKnownGrids> known_grids_;
-  std::string start_refused_;  // Why, if it was.
+  std::string start_refused_;  // Why, if it was. Also when a job has found its place since.
   const bool map_begun_;
   // Number and stamp of the first scan that arrived, until one is used.
   std::optional<std::uint64_t> first_sequence_;

@@ -40,7 +40,6 @@ bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   const bool fragment = grid.fragment || !adopted, was_fragment = fragment_;
   if (fragment && (!fragment_ || !adopted)) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = fragment;
-  if (!fragment_) start_refused_.clear();
   T_map_keyframe_.reset();
   // A robot that sends nothing more is where the map version has it as well. (One that is only localised was there when
   // it mapped last, and must be found again.)

@@ -25,6 +25,8 @@ namespace cairn::slam {
 struct SessionKeyframe {
   std::size_t session = 0;
   std::size_t keyframe = 0;
+
+  bool operator==(const SessionKeyframe&) const = default;
 };
 
 // How two keyframes of different sessions lie relative to each other, measured by matching what was seen from them.
@@ -33,6 +35,8 @@ struct SessionRelation {
   SessionKeyframe to;
   Pose2 T_from_to;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // (x, y, theta) of T_from_to, in `from`.
+
+  bool operator==(const SessionRelation&) const = default;
 };
 
 class SessionMap {

@@ -185,6 +185,7 @@ class Smoothing {
   // Relations between all sessions that lie in one frame, searched anew along the solved paths.
   bool Refine() {
     auto relations_before = static_cast<double>(began_with_);
+    std::vector<SessionRelation> solved_with;
     distrusts_ = false;
     for (int round = 0; round < kRounds; ++round) {
       Done(kShareOfPlaces + (1.0 - kShareOfPlaces) * round / kRounds);
@@ -196,8 +197,11 @@ class Smoothing {
         if (!go_on_(done_)) return false;
         all.insert(all.end(), found.begin(), found.end());
       }
+      // Along the paths that were solved with these they were found again: so they stay as they are.
+      if (round > 0 && all == solved_with) break;
       for (const auto& [a, b] : pairs) graph_.RemoveBetween(a, b);
       graph_.Add(all);
+      solved_with = std::move(all);
       if (!SolveAndWithdraw()) return false;
       bool removed = false;
       for (const auto& [a, b] : pairs) {

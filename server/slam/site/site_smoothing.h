@@ -26,7 +26,7 @@ struct SiteSession {
   // Whether the place of its first keyframe in the site is known, to half a metre.
   bool start_known = true;
   std::uint64_t id = 0;  // Its number in the book; of no meaning without one.
-  // Its session began without a start; later jobs may find that its place is another one.
+  // Its session began without a start, or that was refused; later jobs may find that its place is another one.
   bool start_found = false;
 };
 

@@ -11,7 +11,10 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kMovedCells = 0.1;
+// A centimetre in cells of 5 cm, at the end of the longest ray: less than the noise of a range. What a robot sees in
+// its last metres turns its whole path by a few thousandths of a degree, which moves the ends of long rays by half as
+// much.
+constexpr double kMovedCells = 0.2;
 // An earlier drawing with less in common is not continued, because all would be drawn again nevertheless.
 constexpr double kLeastInCommon = 0.75;
 

@@ -1,6 +1,6 @@
 // The map of one robot, drawn along a path, with what it was drawn from. It is kept from one smoothing job to the next,
 // so that a map is drawn at the cost of what has changed: keyframes that are new, that are gone, or whose poses have
-// moved by so much that the end of one of their rays lies more than a tenth of a cell from where it was drawn. The
+// moved by so much that the end of one of their rays lies more than a fifth of a cell from where it was drawn. The
 // distance is always that from the pose with which the keyframe was drawn, so that small moves add up.
 // The order in which scans are drawn matters, because cells are clamped. So chunks in which anything has changed (but
 // for keyframes at the end of the path) are drawn again as a whole, by all scans that reach them, in order. The result

@@ -26,11 +26,12 @@ struct MappingRobot : testing::RoomRobot {
     setup.fragment = fragment;
     return setup;
   }
-  slam::MapperSnapshot Snapshot() {
+  SessionMaterial Material() {
     SessionMaterial taken;
     estimator.Handle(SnapshotWanted{[&taken](SessionMaterial&& material) { taken = std::move(material); }});
-    return std::move(taken.snapshot);
+    return taken;
   }
+  slam::MapperSnapshot Snapshot() { return Material().snapshot; }
   // The whole path as it would be after a job that found a turn of `turn_rad` at each keyframe, moved by `T_new_old`.
   RobotGrid Corrected(const Pose2& T_new_old, double turn_rad) {
     std::vector<Pose2> path = Snapshot().full_path;
@@ -165,6 +166,24 @@ TEST(PastPoses, AfterARefusedStartNoneIsLocalized) {
   EXPECT_TRUE(robot.Poses().back().localized);
   robot.estimator.Handle(StartRefused{"it is elsewhere"});
   for (const PathPose& pose : robot.Poses()) EXPECT_EQ(pose.reason, PoseReason::kNotJoined);
+}
+
+// A job that has found the place of a robot may be wrong, whatever was said of its start before.
+TEST(PastPoses, ARefusedStartIsNoToldOneWhenTheRobotIsJoined) {
+  MappingRobot robot;
+  robot.Drive(0, 20);
+  EXPECT_TRUE(robot.Material().start_known);
+  EXPECT_FALSE(robot.Material().start_found);
+  robot.estimator.Handle(StartRefused{"it is elsewhere"});
+  EXPECT_FALSE(robot.Material().start_known);
+  EXPECT_EQ(robot.record.joining().why, "it is elsewhere");
+  const RobotGrid alone = robot.Adopt(9, robot.Corrected({5.0, -3.0, 1.0}, 0.0));
+  EXPECT_TRUE(robot.Material().start_known);
+  EXPECT_TRUE(robot.Material().start_found);
+  EXPECT_EQ(robot.record.joining().why, "");
+  robot.Adopt(10, RobotGrid(alone));
+  EXPECT_FALSE(robot.Material().start_known);
+  EXPECT_EQ(robot.record.joining().why, "it is elsewhere");
 }
 
 }  // namespace

@@ -61,6 +61,7 @@ Joined Smooth(const std::vector<LogRun>& runs, const std::vector<std::size_t>& o
 struct JobTime {
   double all_s = 0.0, drawing_s = 0.0;
   std::size_t keyframes = 0, drawn_anew = 0;  // Along both paths.
+  bool all_joined = false;
 };
 
 constexpr double kMostLiveRatio = 1.2;
@@ -76,6 +77,7 @@ JobTime RunJob(const std::vector<slam::MapperSnapshot>& snapshots, const slam::M
   for (std::size_t i = 0; i < snapshots.size(); ++i) sessions.push_back({snapshots[i], false, i + 1});
   const auto smoothed = slam::SmoothSessions(
       sessions, SiteOptionsOf(options), [](double) { return true; }, slam::SiteSearch::kAll, &book);
+  time.all_joined = std::ranges::all_of(*smoothed, [](const auto& session) { return session.joined; });
   const Stopwatch drawing;
   drawings.resize(snapshots.size());
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
@@ -90,13 +92,14 @@ JobTime RunJob(const std::vector<slam::MapperSnapshot>& snapshots, const slam::M
   return time;
 }
 
-// A job, and a second one when little has changed: each robot has driven three hundredths more.
-void RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, const slam::MapperOptions& options,
-                StudyContext& context, Table& table) {
-  constexpr double kBefore = 0.97;
+// A job when this share of each part is driven, and a second one at its end. Whether the first has joined all.
+bool RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, double share,
+                const slam::MapperOptions& options, StudyContext& context, Table& table) {
   std::vector<slam::MapperSnapshot> before, now;
+  before.reserve(runs.size());
+  now.reserve(runs.size());
   for (const LogRun& run : runs) {
-    before.push_back(FirstPart(run.snapshot, kBefore));
+    before.push_back(FirstPart(run.snapshot, share));
     now.push_back(run.snapshot);
   }
   slam::RelationBook book;
@@ -104,15 +107,24 @@ void RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, const 
   const JobTime first = RunJob(before, options, book, drawings);
   const std::size_t measured_first = book.measured();
   const JobTime second = RunJob(now, options, book, drawings);
-  table.Add({name, Number(first.all_s, 2), Number(second.all_s, 2), Number(second.all_s / first.all_s, 3),
-             Number(first.drawing_s, 2), Number(second.drawing_s, 2),
-             std::to_string(second.drawn_anew) + " of " + std::to_string(second.keyframes),
+  table.Add({name, Number(100.0 * share, 0) + " %", first.all_joined ? "all" : "not all", Number(first.all_s, 2),
+             Number(second.all_s, 2), Number(second.all_s / first.all_s, 3), Number(first.drawing_s, 2),
+             Number(second.drawing_s, 2), std::to_string(second.drawn_anew) + " of " + std::to_string(second.keyframes),
              std::to_string(measured_first), std::to_string(book.measured()), std::to_string(book.reused()),
              Number(1e-6 * static_cast<double>(book.BytesOf({1, 2}).size()), 2)});
-  if (context.quick) return;
+  if (context.quick || !first.all_joined) return first.all_joined;
   context.report.Expect(
       second.all_s <= kMostSecondJob * first.all_s,
       name + ": a second job took " + Number(100.0 * second.all_s / first.all_s, 1) + " % of the first one");
+  return true;
+}
+
+// Where the first job cannot join all yet, what the second one does is new: then the first is made later.
+void RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, const slam::MapperOptions& options,
+                StudyContext& context, Table& table) {
+  for (const double share : {0.97, 0.98, 0.99})
+    if (RunTwoJobs(runs, name, share, options, context, table)) return;
+  context.report.Warn(name + ": no first job has joined all");
 }
 
 Trajectory PathOf(const std::vector<LogRun>& runs, const Joined& joined) {
@@ -253,8 +265,9 @@ void RunJoint(StudyContext& context) {
       "one part, and between two.");
   Table table({"log", "robots", "joined", "one robot live (m)", "live / smoothed", "one robot (m)", "joint (m)",
                "ratio", "inside (m)", "across (m)", "relations across", "max (m)", "processor time (s)"});
-  Table jobs({"log", "first job (s)", "second (s)", "ratio", "first, drawing (s)", "second, drawing (s)",
-              "drawn anew by the second", "measured", "measured by the second", "used again", "MB of the first pair"});
+  Table jobs({"log", "driven before", "joined by the first", "first job (s)", "second (s)", "ratio",
+              "first, drawing (s)", "second, drawing (s)", "drawn anew by the second", "measured",
+              "measured by the second", "used again", "MB of the first pair"});
   Table sessions({"robot", "joined", "frame of", "relations", "withdrawn", "agreement"});
   for (const Case& one : {Case{"intel", 3, 1.15}, Case{"mit-csail", 2, 1.3}, Case{"mit-killian", 2, 1.3}})
     if (context.Wants(one.log)) RunCut(context, one, table, sessions, jobs);
@@ -263,7 +276,8 @@ void RunJoint(StudyContext& context) {
   context.report.Text(
       "A job when 97 % of each part is driven, and a second one at its end, which knows what the first has measured "
       "(RelationBook) and drawn (DrawnMap: keyframes along both paths; only those that have moved are drawn anew). "
-      "Both with the drawing of the maps, processor time.");
+      "Both with the drawing of the maps, processor time. Where the first cannot join all yet, the second does so for "
+      "the first time, and a later first job follows (98 %, 99 %).");
   context.report.Add(jobs, "jobs");
   context.report.Text(
       "Three simulated robots, starts unknown, a hundred metres of way each, joined by a smoothing job, or by a job "
