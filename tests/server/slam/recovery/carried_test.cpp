@@ -197,9 +197,10 @@ World CorridorWithDoorways() {
 }
 
 // Nothing shows the place to which it is carried, and only its last keyframes could show the place where it was, which
-// it soon leaves behind. More doorways differ than somebody can have changed between two scans.
+// it soon leaves behind. More doorways differ than somebody can have changed between two scans. (12 m along, the
+// doorways lie as here: carried there, it is not noticed.)
 TEST(CarriedUnseen, ARobotInACorridorIsNotLocalizedWhereItHasNeverBeen) {
-  for (const double carried_m : {5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0}) {
+  for (const double carried_m : {5.0, 6.0, 7.0, 8.0, 9.0, 10.0}) {
     CarriedRobot robot(CorridorWithDoorways(), 8.0);
     for (int i = 0; i < 48; ++i) robot.Follow({{0.25, 0, 0}});
     const int before = robot.not_localized;
@@ -226,7 +227,7 @@ TEST(CarriedScene, DiffersAtOnePlaceWhereADoorWasClosed) {
   EXPECT_FALSE(differs(closed, 0.0));
   closed.Add({{14.0, 1.2}, {15.1, 1.2}});
   EXPECT_FALSE(differs(closed, 0.0));
-  closed.Add({{17.0, -1.2}, {18.1, -1.2}});
+  closed.Add({{12.0, -1.2}, {13.1, -1.2}});
   EXPECT_TRUE(differs(closed, 0.0));
   EXPECT_TRUE(differs(CorridorWithDoorways(), 9.0));
 }
