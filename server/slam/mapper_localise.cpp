@@ -65,17 +65,17 @@ Passage Mapper::State::LocaliseAfter(Passage passage, bool tilted) {
 }
 
 // If somebody may have carried the robot since the last scan: how that agreed with the known map.
-std::optional<SceneAgreement> Mapper::State::BeforeCarriedInMap(const Scan& scan,
-                                                                const std::vector<SurfacePoint>& points_robot,
-                                                                const TrackStep& step) const {
+std::optional<Mapper::State::SignOfCarrying> Mapper::State::BeforeCarriedInMap(
+    const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step) const {
   if (!options.self_check.enabled || localisation->looking() || !last_scan) return std::nullopt;
   if (!MayBeCarried(LastScore(), step.score)) return std::nullopt;
   const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
   const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, LastScore()};
   const FollowedMap followed{*localisation->map(), localisation->T_map_track()};
   const SceneAgreement before = AgreementWithMap(followed, last);
-  if (!LooksCarried(followed, last, before, {scan, points_robot, step.T_track_robot, step.score})) return std::nullopt;
-  return before;
+  const SeenScan now{scan, points_robot, step.T_track_robot, step.score};
+  if (!LooksCarried(followed, last, before, now)) return std::nullopt;
+  return SignOfCarrying{before, DiffersAtSeveralPlaces(last, now)};
 }
 
 ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage, bool rolling,
@@ -93,7 +93,8 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
   const bool deformed =
       rolling && last_scan && std::abs(AngleDiff(T_odom_robot.theta, last_scan->T_odom_robot.theta)) > kFastTurnRad;
   const auto before_carried = driven && !deformed ? BeforeCarriedInMap(*still, view.points_robot, step) : std::nullopt;
-  if (before_carried && !StoodStill(*still, T_odom_robot, step)) localisation->Doubt(*before_carried, step.score);
+  if (before_carried && !StoodStill(*still, T_odom_robot, step))
+    localisation->Doubt(before_carried->before, step.score, before_carried->at_several_places);
   learning.LearnUnless(!driven || localisation->looking() || !options.front_end.use_odometry, step);
   // The last scans do not belong together with this one.
   if (!watched || (!step.matched && localisation->looking())) {

@@ -49,7 +49,9 @@ void Mapper::State::CheckPlace(Passage passage, bool rolling, TrackedScan& track
   const bool watched = (driven && !before_carried) || StoodStill(*still, T_odom_robot, step) ||
                        (passage == Passage::kPaused && GoesOn(*still, view.points_robot, T_odom_robot, step));
   if (!watched && passage != Passage::kUnknown) step = DoubtPlace(view, T_odom_robot, step, parallel_for);
-  if (before_carried && recovery.on_path()) recovery.BeginDoubt(*before_carried, step.score);
+  if (before_carried && recovery.on_path()) {
+    recovery.BeginDoubt(before_carried->before, step.score, before_carried->at_several_places);
+  }
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
 }
 
@@ -64,16 +66,17 @@ double Mapper::State::LastTurn() const {
 }
 
 // If somebody may have carried the robot since the last scan: how that agreed with the last keyframes.
-std::optional<SceneAgreement> Mapper::State::BeforeCarried(const Scan& scan,
-                                                           const std::vector<SurfacePoint>& points_robot,
-                                                           const TrackStep& step) const {
+std::optional<Mapper::State::SignOfCarrying> Mapper::State::BeforeCarried(const Scan& scan,
+                                                                          const std::vector<SurfacePoint>& points_robot,
+                                                                          const TrackStep& step) const {
   if (!options.self_check.enabled || !HasMap() || recovery.active() || !last_scan) return std::nullopt;
   if (!MayBeCarried(LastScore(), step.score)) return std::nullopt;
   const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
   const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, LastScore()};
   const SceneAgreement before = AgreementWithLast(trail, last);
-  if (!LooksCarried(trail, last, before, {scan, points_robot, step.T_track_robot, step.score})) return std::nullopt;
-  return before;
+  const SeenScan now{scan, points_robot, step.T_track_robot, step.score};
+  if (!LooksCarried(trail, last, before, now)) return std::nullopt;
+  return SignOfCarrying{before, DiffersAtSeveralPlaces(trail, now)};
 }
 
 // Ends the doubt if the scan agrees again with the last keyframes, or if the scans since then contradict each other

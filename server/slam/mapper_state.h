@@ -71,10 +71,15 @@ struct Mapper::State {
   [[nodiscard]] Pose2 OdometryOrNone(const Pose2& T_odom_robot) const {
     return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
   }
-  [[nodiscard]] std::optional<SceneAgreement> BeforeCarried(const Scan& scan,
+  // What tells that somebody may have carried the robot since the last scan.
+  struct SignOfCarrying {
+    SceneAgreement before;
+    bool at_several_places = false;
+  };
+  [[nodiscard]] std::optional<SignOfCarrying> BeforeCarried(const Scan& scan,
                                                             const std::vector<SurfacePoint>& points_robot,
                                                             const TrackStep& step) const;
-  [[nodiscard]] std::optional<SceneAgreement> BeforeCarriedInMap(const Scan& scan,
+  [[nodiscard]] std::optional<SignOfCarrying> BeforeCarriedInMap(const Scan& scan,
                                                                  const std::vector<SurfacePoint>& points_robot,
                                                                  const TrackStep& step) const;
   void EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step,

@@ -79,10 +79,10 @@ void GridLocalisation::Lose(bool odometry_goes_on) {
   recovery_.Begin({last_.T_map_robot, T_odom_robot_, last_.covariance}, odometry_goes_on);
 }
 
-void GridLocalisation::Doubt(const SceneAgreement& before, double score) {
+void GridLocalisation::Doubt(const SceneAgreement& before, double score, bool at_several_places) {
   last_.reason = PoseReason::kLost;
   recovery_.BeginOnPath({last_.T_map_robot, T_odom_robot_, last_.covariance}, T_map_track());
-  recovery_.BeginDoubt(before, score);
+  recovery_.BeginDoubt(before, score, at_several_places);
 }
 
 void GridLocalisation::BeginWhereSaid(const Pose2& T_map_robot) {
@@ -129,7 +129,7 @@ bool GridLocalisation::IsCleared(const Sight& sight) const {
 // The robot is looked for, or doubted.
 GridLocalisation::Followed GridLocalisation::Look(const Sight& sight) {
   if (recovery_.doubt()) {
-    if (IsCleared(sight)) {
+    if (IsCleared(sight) || recovery_.doubted_in_vain()) {
       recovery_.End();
       last_.reason = PoseReason::kOdometryOnly;  // Until the next alignment.
       return Follow(sight);

@@ -3,12 +3,11 @@
 // map shows nothing, the pose goes on with growing doubt. Where three standard deviations reach another place it is not
 // told as localized, but followed on. The robot is lost where that doubt is too large, or where the scans contradict
 // the map over some metres, and it is doubted where somebody may have carried it between two scans
-// (recovery/carried.h). It is then looked for as one that was not watched (recovery.h), in this map, until it is found:
-// unlike a robot that maps, it does not go on along its path where it is found nowhere else. People, and
-// furniture that has moved, contradict in some places; that is borne, because it does not contradict for metres
-// everywhere. Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic. Source: the extended
-// Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points and
-// surfaces.
+// (recovery/carried.h). It is then looked for as one that was not watched (recovery.h), in this map, until it is found,
+// or goes on along its path as one that maps, where only a door has changed. People, and furniture that has moved,
+// contradict in some places; that is borne, because it does not contradict for metres everywhere. Frames: `map`;
+// `track` is that of the front-end. Not thread-safe. Deterministic. Source: the extended Kalman filter over matches
+// with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points and surfaces.
 #pragma once
 
 #include <deque>
@@ -55,8 +54,9 @@ class GridLocalisation {
   // The robot may be anywhere. `odometry_goes_on`: since the last scan.
   void Lose(bool odometry_goes_on);
   // The robot may have been carried since the last scan (carried.h), which agreed with the map as `before` says. The
-  // scan after it has this score. The robot is not localized until that is clear, and looked for if it stays so.
-  void Doubt(const SceneAgreement& before, double score);
+  // scan after it has this score, and differs at several places (DiffersAtSeveralPlaces) or not. The robot is not
+  // localized until that is clear, and looked for if it stays so.
+  void Doubt(const SceneAgreement& before, double score, bool at_several_places);
   // Somebody says that it is at this pose.
   void BeginWhereSaid(const Pose2& T_map_robot);
 

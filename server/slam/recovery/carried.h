@@ -3,7 +3,8 @@
 // and it contradicts them more: either shows surfaces where beams of the other passed. What passes close to the lidar
 // looks so for a moment, but then the next scans are again as those before. So the robot is doubted first, and has been
 // carried if it stays so. It cannot notice a robot that is carried to a place where all that it sees looks the same,
-// for example along a corridor without doors. Frames: `track` is that of the front-end. Stateless, thread-safe.
+// for example along a corridor without doors. A door that somebody has opened or closed looks like it as well, but only
+// at one place. Frames: `track` is that of the front-end. Stateless, thread-safe.
 #pragma once
 
 #include <span>
@@ -51,6 +52,10 @@ struct SeenScan {
 // agreement of `last`.
 [[nodiscard]] bool LooksCarried(const Trail& trail, const SeenScan& last, const SceneAgreement& before,
                                 const SeenScan& now);
+// Whether what contradicts between `now` and the last keyframes, or the last scan, lies at several places: then it is
+// likely that the robot was carried, because one door or one piece of furniture that has moved does not explain it.
+[[nodiscard]] bool DiffersAtSeveralPlaces(const Trail& trail, const SeenScan& now);
+[[nodiscard]] bool DiffersAtSeveralPlaces(const SeenScan& last, const SeenScan& now);
 // The map of others in which a robot is followed that has no last keyframes, and where its track lies in it.
 struct FollowedMap {
   const SearchedMap& map;

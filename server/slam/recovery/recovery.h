@@ -118,8 +118,9 @@ class Recovery {
   // A robot on its path may have been carried since the last scan.
   struct Doubt {
     SceneAgreement before;  // Of the last scan with the last keyframes.
-    // Most of the scan after it was not explained, or since then its map has shown it elsewhere: at the place where its
-    // scans fit best nothing contradicted them, whether or not it has rivals, as in a corridor of equal rooms.
+    // Most of the scan after it was not explained, or it differed at several places, or since then its map has shown it
+    // elsewhere: at the place where its scans fit best nothing contradicted them, whether or not it has rivals, as in a
+    // corridor of equal rooms.
     bool likely = false;
     bool searched = false;  // The whole map has been searched for the robot since then.
 
@@ -131,9 +132,9 @@ class Recovery {
       if (has_searched) archive(self.searched);
     }
   };
-  // REQUIRES: on_path.
-  void BeginDoubt(const SceneAgreement& before, double score) {
-    doubt_ = Doubt{before, score < options_.place.min_explained, false};
+  // `score` is that of the scan with which it begins, `at_several_places`: DiffersAtSeveralPlaces. REQUIRES: on_path.
+  void BeginDoubt(const SceneAgreement& before, double score, bool at_several_places) {
+    doubt_ = Doubt{before, at_several_places || score < options_.place.min_explained, false};
   }
   [[nodiscard]] const std::optional<Doubt>& doubt() const { return doubt_; }
   // Whether it has been doubted for so long that it counts as carried.
