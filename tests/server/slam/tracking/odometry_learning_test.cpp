@@ -203,7 +203,7 @@ TEST(OdometryLearning, CanBeSwitchedOff) {
   EXPECT_TRUE(driven.learning().values().empty());
   EXPECT_TRUE(driven.as_reported());
   OdometryLearning without_odometry({}, false);
-  EXPECT_EQ(without_odometry.Corrected({1.0, 2.0, 3.0}, true, {}), Pose2(1.0, 2.0, 3.0));
+  EXPECT_EQ(without_odometry.Corrected({1.0, 2.0, 3.0}, true, {}), (Pose2{1.0, 2.0, 3.0}));
   EXPECT_TRUE(without_odometry.values().empty());
 }
 
