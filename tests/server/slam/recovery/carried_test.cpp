@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/slam/recovery/recovery.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/server/slam/known_grid_of.h"
@@ -251,6 +252,20 @@ TEST(CarriedScene, DiffersAtOnePlaceWhereADoorWasClosed) {
   closed.Add({{12.0, -1.2}, {13.1, -1.2}});
   EXPECT_TRUE(differs(closed, 0.0));
   EXPECT_TRUE(differs(CorridorWithDoorways(), 9.0));
+}
+
+// Only one that was not likely carried may go on along its path.
+TEST(CarriedDoubt, IsThatOfALikelyCarriedRobotIfLittleIsExplainedOrSeveralPlacesDiffer) {
+  const MapperOptions options;
+  const double much = options.recovery.place.min_explained + 0.1, little = much - 0.2;
+  for (const auto& [score, at_several_places, likely] :
+       {std::tuple(much, false, false), std::tuple(much, true, true), std::tuple(little, false, true)}) {
+    Recovery recovery(options.recovery, options.loop, options.self_check, options.front_end.refine,
+                      options.front_end.surface, options.blind, true, options.lost_after_m);
+    recovery.BeginOnPath({{}, {}, Eigen::Matrix3d::Identity()}, {});
+    recovery.BeginDoubt({0.95, 0.01, true}, score, at_several_places);
+    EXPECT_EQ(recovery.doubt()->likely, likely) << score << ' ' << at_several_places;
+  }
 }
 
 TEST(CarriedScene, DiffersForLongOnlyWhereNothingMoves) {

@@ -196,19 +196,6 @@ TEST_F(Lost, OdometryCarriesThePoseWithItsDoubtUntilTheWayIsTooLong) {
   EXPECT_GT(after({}).covariance(0, 0), 1e5);
 }
 
-// Only one that was not may go on along its path.
-TEST_F(Lost, ADoubtedRobotWasLikelyCarriedIfLittleIsExplainedOrSeveralPlacesDiffer) {
-  const SceneAgreement before{0.95, 0.01, true};
-  const double much = MapperOptions{}.recovery.place.min_explained + 0.1, little = much - 0.2;
-  for (const auto& [score, at_several_places, likely] :
-       {std::tuple(much, false, false), std::tuple(much, true, true), std::tuple(little, false, true)}) {
-    Recovery recovery = Make();
-    recovery.BeginOnPath(KnownAt(10), {});
-    recovery.BeginDoubt(before, score, at_several_places);
-    EXPECT_EQ(recovery.doubt()->likely, likely) << score << ' ' << at_several_places;
-  }
-}
-
 TEST_F(Lost, OnThePathTheScansCarryThePose) {
   Recovery recovery = Make();
   recovery.BeginOnPath(KnownAt(10), {7.0, 1.0, 0.5});
