@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -120,28 +121,39 @@ GridAgreement CompareGrids(const OccupancyGrid::Chunks& grid, const OccupancyGri
 
   const auto turns = static_cast<int>(std::lround(GridAgreement::kReachRad / kStepRad));
   const auto steps = static_cast<int>(std::lround(GridAgreement::kReachM / kStepM));
+  // At the best place most of what can be compared agrees.
+  const auto agrees = [](const GridAgreement& one) {
+    return static_cast<long>(one.compared) - 2 * static_cast<long>(one.contradicted);
+  };
+  // Nothing if less agrees there than `least`, even if all that is not compared yet agrees.
+  const auto compare_at = [&](const Eigen::Matrix2d& R, const Eigen::Vector2d& shift,
+                              long least) -> std::optional<GridAgreement> {
+    GridAgreement agreement;
+    auto left = static_cast<long>(own.size() + theirs.size());
+    const auto may_be_best = [&](Known::What what) {
+      agreement.compared += what != Known::kNothing ? 1 : 0;
+      agreement.contradicted += what == Known::kIsFree ? 1 : 0;
+      return agrees(agreement) + --left >= least;
+    };
+    for (const Eigen::Vector2d& wall : own)
+      if (!may_be_best(of_others(cell_of(R * wall + shift + c)))) return std::nullopt;
+    for (const Eigen::Vector2d& wall : theirs)
+      if (!may_be_best(of_robot(cell_of(R.transpose() * (wall - shift) + c)))) return std::nullopt;
+    return agreement;
+  };
+  // Where the robot is said to be is one of the places, and mostly nearly the best: the others need only be compared
+  // until they are worse.
+  const auto all = static_cast<long>(own.size() + theirs.size());
+  long least = agrees(*compare_at(Eigen::Matrix2d::Identity(), Eigen::Vector2d::Zero(), -2 * all));
   GridAgreement best;
   for (int turn = -turns; turn <= turns; ++turn) {
     const Eigen::Matrix2d R = Pose2{0.0, 0.0, turn * kStepRad}.rotation();
     for (int y = -steps; y <= steps; ++y) {
       for (int x = -steps; x <= steps; ++x) {
-        const Eigen::Vector2d shift = kStepM * Eigen::Vector2d(x, y);
-        GridAgreement agreement;
-        for (const Eigen::Vector2d& wall : own) {
-          const Known::What what = of_others(cell_of(R * wall + shift + c));
-          agreement.compared += what != Known::kNothing ? 1 : 0;
-          agreement.contradicted += what == Known::kIsFree ? 1 : 0;
-        }
-        for (const Eigen::Vector2d& wall : theirs) {
-          const Known::What what = of_robot(cell_of(R.transpose() * (wall - shift) + c));
-          agreement.compared += what != Known::kNothing ? 1 : 0;
-          agreement.contradicted += what == Known::kIsFree ? 1 : 0;
-        }
-        // At the best place most of what can be compared agrees.
-        const auto agrees = [](const GridAgreement& one) {
-          return static_cast<double>(one.compared) - 2.0 * static_cast<double>(one.contradicted);
-        };
-        if (best.compared == 0 || agrees(agreement) > agrees(best)) best = agreement;
+        const auto agreement = compare_at(R, kStepM * Eigen::Vector2d(x, y), least);
+        if (!agreement) continue;
+        best = *agreement;
+        least = agrees(best) + 1;
       }
     }
   }
