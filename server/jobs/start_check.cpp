@@ -32,9 +32,9 @@ void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::sha
   const auto ask = [session, way_m = watched->compared_at_m,
                     comparing = std::make_shared<Comparing>(watched)](const GridAgreement& agreement) {
     if (!comparing->judgement().Refuses(agreement, way_m)) return false;
-    const std::string why =
-        fmt::format("its start contradicts the map: {:.0f} % of the walls that it or others see are free for the other",
-                    100.0 * agreement.contradicted_share());
+    const std::string why = fmt::format(
+        "its start contradicts the map: {:.0f} % of the compared walls stand where the other side has seen free space",
+        100.0 * agreement.contradicted_share());
     const LogContext context(AboutRobot(session->record().state().robot, session->record().state().site));
     spdlog::warn("robot {}: {}. It is not localized, and not shown, until it is joined with the map",
                  session->record().state().robot, why);
