@@ -197,7 +197,7 @@ class Smoothing {
         if (!go_on_(done_)) return false;
         all.insert(all.end(), found.begin(), found.end());
       }
-      // Along the paths that were solved with these they were found again: so they stay as they are.
+      // The paths that were solved with these relations show the same ones again: another round would change nothing.
       if (round > 0 && all == solved_with) break;
       for (const auto& [a, b] : pairs) graph_.RemoveBetween(a, b);
       graph_.Add(all);
