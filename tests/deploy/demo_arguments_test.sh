@@ -46,10 +46,18 @@ pretend "$world/tree/deploy/build-jobs.sh" "echo 1"
 pretend "$world/path/cmake" :
 pretend "$world/path/sleep" "exec /bin/sleep 0.02"
 pretend "$world/path/xdg-open" "echo \"\$1\" >'$world/opened'"
-pretend "$bin/cairn" 'case "$*" in *eval*) echo "{\"ate_rmse_m\":0.01}" ;; *animate*) echo "growing.png: 7 frames" ;; esac'
-runs="trap 'exit 0' TERM; while :; do /bin/sleep 0.02; done"
-pretend "$bin/cairnd" "echo \$\$ >'$world/server'; $runs"
-pretend "$bin/cairn-web" "echo cairn-web: http://127.0.0.1:9/; $runs"
+stays="while :; do /bin/sleep 0.02; done"
+# As in a real run, the robots drive until the server runs and the film has begun, and both are told to end after that.
+# A program that is told so before it has set its trap would leave no output.
+films="trap 'echo growing.png: 7 frames; exit 0' TERM; echo >'$world/filming'; $stays"
+drives="until [ -s '$world/server' ] && [ -e '$world/filming' ]; do /bin/sleep 0.02; done; rm '$world/filming'"
+pretend "$bin/cairn" "case \"\$*\" in
+  eval*) echo '{\"ate_rmse_m\":0.01}' ;;
+  *'map animate'*) $films ;;
+  sim*) $drives ;;
+esac"
+pretend "$bin/cairnd" "trap 'exit 0' TERM; echo \$\$ >'$world/server'; $stays"
+pretend "$bin/cairn-web" "trap 'exit 0' TERM; echo cairn-web: http://127.0.0.1:9/; $stays"
 export PATH=$world/path:$PATH DEMO_OUT=$world/out
 unset DISPLAY WAYLAND_DISPLAY
 demo=$world/tree/deploy/demo.sh
