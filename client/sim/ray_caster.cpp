@@ -14,17 +14,6 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-double CastAtSegment(const Segment& segment, const Eigen::Vector2d& origin, const Eigen::Vector2d& direction) {
-  // A little overlap at the ends, so that no ray slips through the joint of two segments.
-  constexpr double kEndSlack = 1e-9;
-  const Eigen::Vector2d edge = segment.b_map - segment.a_map, to_a = segment.a_map - origin;
-  const double denominator = Cross(direction, edge);
-  if (std::abs(denominator) < 1e-12) return kNothingHit;  // Along the wall: its neighbours end the ray.
-  const double distance = Cross(to_a, edge) / denominator, share = Cross(to_a, direction) / denominator;
-  if (distance < 0.0 || share < -kEndSlack || share > 1.0 + kEndSlack) return kNothingHit;
-  return distance;
-}
-
 // The part of the ray inside [low, high] on one axis, narrowing [enter, leave].
 void ClipAxis(double origin, double direction, double low, double high, double* enter, double* leave) {
   if (direction == 0.0) {
@@ -38,6 +27,17 @@ void ClipAxis(double origin, double direction, double low, double high, double* 
 }
 
 }  // namespace
+
+double CastAtSegment(const Segment& segment, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction) {
+  // A little overlap at the ends, so that no ray slips through the joint of two segments.
+  constexpr double kEndSlack = 1e-9;
+  const Eigen::Vector2d edge = segment.b_map - segment.a_map, to_a = segment.a_map - origin_map;
+  const double denominator = Cross(direction, edge);
+  if (std::abs(denominator) < 1e-12) return kNothingHit;  // Along the wall: its neighbours end the ray.
+  const double distance = Cross(to_a, edge) / denominator, share = Cross(to_a, direction) / denominator;
+  if (distance < 0.0 || share < -kEndSlack || share > 1.0 + kEndSlack) return kNothingHit;
+  return distance;
+}
 
 RayCaster::RayCaster(std::vector<Segment> segments) : segments_(std::move(segments)) {
   if (segments_.empty()) return;

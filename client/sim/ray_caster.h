@@ -36,6 +36,10 @@ class RayCaster {
   std::vector<std::uint32_t> members_;     // Segment indices.
 };
 
+// Distance along the ray to the segment; kNothingHit if it misses, runs alongside or lies behind.
+[[nodiscard]] double CastAtSegment(const Segment& segment, const Eigen::Vector2d& origin_map,
+                                   const Eigen::Vector2d& direction);
+
 // Distance along the ray to the disc's rim; kNothingHit if it misses or starts inside.
 [[nodiscard]] double CastAtDisc(const Disc& disc, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction);
 

@@ -8,15 +8,43 @@ namespace cairn::sim {
 namespace {
 
 constexpr double kUpright = 1e-9;  // Horizontal share of a direction below which it has no shadow.
+constexpr double kOffPaneM = 1e-6;
+
+// The angle between the ray and the pane's normal, 0..pi/2.
+double IncidenceOn(const Pane& pane, const Eigen::Vector2d& direction) {
+  const Eigen::Vector2d along = (pane.b_map - pane.a_map).normalized();
+  return std::asin(std::min(1.0, std::abs(along.dot(direction))));
+}
 
 }  // namespace
 
 double FlatScene::Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction, double max_m) const {
   const Eigen::Vector2d origin = origin_map.head<2>(), shadow = direction.head<2>();
-  if (direction.z() == 0.0) return walls_.Cast(origin, shadow, max_m);  // Exactly as in the plane.
+  if (direction.z() == 0.0) return CastInPlane(origin, shadow, max_m);  // Exactly as in the plane.
   const double share = shadow.norm();
   if (share < kUpright) return kNothingHit;
-  return walls_.Cast(origin, shadow / share, max_m * share) / share;
+  return CastInPlane(origin, shadow / share, max_m * share) / share;
+}
+
+double FlatScene::CastInPlane(const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction, double max_m) const {
+  const double to_wall = walls_.Cast(origin_map, direction, max_m);
+  double nearest = std::min(to_wall, max_m);
+  const Pane* mirror = nullptr;  // The nearest pane that does not let the ray through, if it mirrors.
+  bool seen = false;
+  for (const Pane& pane : panes_) {
+    const double range = CastAtSegment({pane.a_map, pane.b_map}, origin_map, direction);
+    if (range >= nearest || range < kOffPaneM) continue;
+    const double incidence = IncidenceOn(pane, direction);
+    if (incidence > pane.seen_rad && incidence < kMirrorRad) continue;
+    nearest = range;
+    seen = incidence <= pane.seen_rad;
+    mirror = seen ? nullptr : &pane;
+  }
+  if (seen) return nearest;
+  if (mirror == nullptr) return to_wall;
+  const Eigen::Vector2d along = (mirror->b_map - mirror->a_map).normalized();
+  const Eigen::Vector2d mirrored = 2.0 * along.dot(direction) * along - direction;
+  return nearest + walls_.Cast(origin_map + nearest * direction, mirrored, max_m - nearest);
 }
 
 double CastAtPost(const Post& post, const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction) {
@@ -45,7 +73,7 @@ double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_ma
 Surroundings SurroundingsOf(World world) {
   Surroundings surroundings;
   surroundings.name = std::move(world.name);
-  surroundings.scene = std::make_shared<FlatScene>(RayCaster(std::move(world.segments)));
+  surroundings.scene = std::make_shared<FlatScene>(RayCaster(std::move(world.segments)), std::move(world.panes));
   for (const Disc& disc : world.discs) surroundings.posts.push_back({disc});
   surroundings.walkers = std::move(world.walkers);
   surroundings.doors = std::move(world.doors);

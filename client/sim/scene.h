@@ -24,15 +24,21 @@ class Scene {
 };
 
 // The segments of a flat world as walls without an upper end: a ray that rises or falls meets a wall where its
-// projection onto the floor does.
+// projection onto the floor does. Panes of glass likewise; what a pane mirrors is a wall, never a post, and is mirrored
+// once. Panes are tried one by one, so there should be few.
 class FlatScene : public Scene {
  public:
-  explicit FlatScene(RayCaster walls) : walls_(std::move(walls)) {}
+  explicit FlatScene(RayCaster walls, std::vector<Pane> panes = {})
+      : walls_(std::move(walls)), panes_(std::move(panes)) {}
   [[nodiscard]] double Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction,
                             double max_m) const override;
 
  private:
+  [[nodiscard]] double CastInPlane(const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction,
+                                   double max_m) const;
+
   RayCaster walls_;
+  std::vector<Pane> panes_;
 };
 
 class SolidScene : public Scene {

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "common/geometry/angle.h"
+
 namespace cairn::sim {
 
 struct Segment {
@@ -36,6 +38,20 @@ struct Door {
   double begin_s = 0.0;  // How long before the beginning it was closed.
 };
 
+// How far from its normal a pane still returns a beam: assumed, since makers of lidars do not state it.
+inline constexpr double kDefaultSeenRad = Radians(10.0);
+// A pane of glass without thickness. A beam that meets it within `seen_rad` of its normal returns from it. A more
+// oblique one goes through, and one beyond kMirrorRad is mirrored. Frame: `map`.
+struct Pane {
+  Eigen::Vector2d a_map;
+  Eigen::Vector2d b_map;
+  double seen_rad = kDefaultSeenRad;
+};
+// Where a pane reflects half of the light and lets the other half through: Fresnel's equations for two surfaces of
+// refractive index 1.5 and unpolarised light. A lidar that reports the strongest return sees the mirrored wall from
+// there on.
+inline constexpr double kMirrorRad = Radians(79.0);
+
 // Waypoints a robot drives in a circle: at least 2, from the last back to the first.
 struct Route {
   std::string name;
@@ -48,6 +64,7 @@ struct World {
   std::vector<Disc> discs;
   std::vector<Walker> walkers;
   std::vector<Door> doors;
+  std::vector<Pane> panes;
   std::vector<Route> routes;
 };
 

@@ -214,6 +214,13 @@ Door TakeDoor(Keys& keys) {
   return door;
 }
 
+Pane TakePane(Keys& keys) {
+  Pane pane{keys.Point2("from"), keys.Point2("to"), Radians(keys.Number("seen", Degrees(kDefaultSeenRad)))};
+  if (pane.a_map == pane.b_map) Complain(keys.node(), "a pane needs two different ends");
+  if (pane.seen_rad < 0.0 || pane.seen_rad > kPi / 2) Complain(keys.node(), "seen must be from 0 to 90 degrees");
+  return pane;
+}
+
 World TakeWorld(Keys& keys) {
   World world;
   std::vector<Segment>& segments = world.segments;
@@ -230,6 +237,7 @@ World TakeWorld(Keys& keys) {
     world.walkers.push_back({k.Positive("radius"), k.Positive("speed"), k.Points(2)});
   });
   keys.ForEachMap("doors", "door", [&](Keys& k) { world.doors.push_back(TakeDoor(k)); });
+  keys.ForEachMap("glass", "pane", [&](Keys& k) { world.panes.push_back(TakePane(k)); });
   return world;
 }
 

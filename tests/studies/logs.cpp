@@ -94,12 +94,17 @@ std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& na
 StudyLog SimulateLog(const std::string& world, double seconds, const sim::FleetOptions& options) {
   auto opened = sim::OpenWorld(world);
   if (!opened) throw std::invalid_argument(opened.error().message);
+  opened->name = std::filesystem::path(world).stem().string();
+  return SimulateLog(*std::move(opened), seconds, options);
+}
+
+StudyLog SimulateLog(sim::World world, double seconds, const sim::FleetOptions& options) {
   sim::FleetOptions one = options;
   one.robots = 1;
-  auto fleet = sim::Fleet::Create(*std::move(opened), one);
-  if (!fleet) throw std::invalid_argument(fleet.error().message);
   StudyLog log;
-  log.name = "simulated " + std::filesystem::path(world).stem().string();
+  log.name = "simulated " + world.name;
+  auto fleet = sim::Fleet::Create(std::move(world), one);
+  if (!fleet) throw std::invalid_argument(fleet.error().message);
   log.T_map_robot_start = fleet->T_map_robot_start(0);
   const Stamp end = options.first_stamp + StampFromSeconds(seconds);
   Stamp stamp = 0;

@@ -42,6 +42,7 @@ struct StudyLog {
 // of way apart. Throws std::invalid_argument on a world or options that are not valid: studies name their
 // own.
 [[nodiscard]] StudyLog SimulateLog(const std::string& world, double seconds, const sim::FleetOptions& options);
+[[nodiscard]] StudyLog SimulateLog(sim::World world, double seconds, const sim::FleetOptions& options);
 
 // The log that --log names, otherwise those of `names` that are available, otherwise a simulated building
 // (with a warning).

@@ -220,6 +220,7 @@ void RunLowcost(StudyContext& context) {
   if (context.Wants("rates")) RunRates(context);
   if (context.Wants("standing")) RunStanding(context);
   if (context.Wants("lidars")) RunLidars(context);
+  if (context.Wants("glass")) RunGlass(context);
   if (context.Wants("rolling")) RunRolling(context);
   if (context.Wants("unknown")) RunUnknown(context);
   if (context.Wants("learning")) {

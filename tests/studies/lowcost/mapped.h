@@ -31,6 +31,8 @@ struct Mapped {
 void RunLowcostLogs(StudyContext& context);
 // The same without their odometry.
 void RunScansAlone(StudyContext& context);
+// An office with glass fronts, with the glass and with walls or nothing in its place.
+void RunGlass(StudyContext& context);
 // Robots with wrong wheels and late scans, which the estimator learns while they drive.
 void RunLearning(StudyContext& context);
 // The same on drives whose wheels are as wrong as usual: whether what was learned of turns makes headings better.
