@@ -114,6 +114,11 @@ void RunLidars(StudyContext& context) {
   robot = with("rplidar-a1");
   robot.laser.error.bias_share = 0.02;
   add("rplidar-a1, ranges 2 % too long", robot);
+  for (const double sigma_m : {0.03, 0.06, 0.1}) {
+    robot = with("rplidar-a1");
+    robot.laser.error = {.sigma_m = sigma_m, .sigma_share = 0.0};
+    add("rplidar-a1, " + Number(100.0 * sigma_m, 0) + " cm of noise", robot);
+  }
   robot = with("rplidar-a1");
   robot.laser.dropout_share = 0.4;
   add("rplidar-a1, 40 % dropped", robot);
