@@ -163,12 +163,22 @@ struct AwaitPool {
   asio::thread_pool& pool;
 };
 
-// What the solver returns: every keyframe has moved a little.
-std::vector<std::vector<Pose2>> Solved(const std::vector<slam::MapperSnapshot>& snapshots) {
+// What the solver returns: in place of a smoothed graph the true poses, moved a little, so that it shows where tiles
+// and paths lie beside each other, and not where the drives of several robots do.
+std::vector<std::vector<Pose2>> Solved(const std::vector<slam::MapperSnapshot>& snapshots, const sim::Fleet& fleet) {
+  const Pose2 T_moved_map{0.1, -0.05, 0.0};
   std::vector<std::vector<Pose2>> paths;
-  for (const slam::MapperSnapshot& snapshot : snapshots) {
-    std::vector<Pose2>& path = paths.emplace_back(snapshot.full_path);
-    for (std::size_t k = 0; k < path.size(); ++k) path[k] = Pose2{0.1, -0.05, 1e-5 * static_cast<double>(k)} * path[k];
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    std::vector<Pose2>& path = paths.emplace_back();
+    path.reserve(snapshots[i].keyframes.size());
+    const Trajectory& truth = fleet.truth(static_cast<int>(i));
+    for (const auto& keyframe : snapshots[i].keyframes) {
+      const auto at = std::lower_bound(truth.begin(), truth.end(), keyframe.scan.stamp(),
+                                       [](const StampedPose& pose, Stamp stamp) { return pose.stamp < stamp; });
+      if (at == truth.end() || at->stamp != keyframe.scan.stamp())
+        throw std::runtime_error("a keyframe has no true pose");
+      path.push_back(T_moved_map * at->T_map_robot);
+    }
   }
   return paths;
 }
@@ -178,9 +188,8 @@ struct Times {
 };
 
 // What a job does from the solved graph on.
-Times Correct(const std::vector<slam::MapperSnapshot>& snapshots, const Robots& robots, Site& site,
-              const slam::GridOptions& options) {
-  const std::vector<std::vector<Pose2>> paths = Solved(snapshots);
+Times Correct(const std::vector<slam::MapperSnapshot>& snapshots, const std::vector<std::vector<Pose2>>& paths,
+              const Robots& robots, Site& site, const slam::GridOptions& options) {
   const Clock::time_point solved = Clock::now();
   server::MapVersion version;
   for (std::size_t i = 0; i < robots.size(); ++i) {
@@ -331,7 +340,9 @@ void StudyCorrection(StudyContext& context) {
   static_cast<void>(LongestMs(robots));
   Stream(fleet, robots, *site, [](double seconds) { return seconds > 5.0; });
   const double before_ms = LongestMs(robots);
-  auto correcting = std::async(std::launch::async, [&] { return Correct(snapshots, robots, *site, options.grid); });
+  const std::vector<std::vector<Pose2>> paths = Solved(snapshots, fleet);
+  auto correcting =
+      std::async(std::launch::async, [&] { return Correct(snapshots, paths, robots, *site, options.grid); });
   Stream(fleet, robots, *site,
          [&](double /*seconds*/) { return correcting.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
   const Times times = correcting.get();
