@@ -73,6 +73,7 @@ void to_json(nlohmann::json& json, const RobotStatus& robot) {
           {"site", robot.session.site},
           {"phase", SessionPhaseName(robot.session.phase)},
           {"fragment", robot.session.fragment},
+          {"localise_only", robot.session.localise_only},
           {"stale", robot.session.stale},
           {"status", robot.session.status},
           {"alive", robot.alive},

@@ -61,9 +61,10 @@ std::string FormatJob(const Job& job) {
 }
 
 std::string FormatRobot(const RobotStatus& robot) {
-  std::string text = fmt::format("{} in {}: {}{}{}\n", robot.session.robot, robot.session.site,
+  std::string text = fmt::format("{} in {}: {}{}{}{}\n", robot.session.robot, robot.session.site,
                                  SessionPhaseName(robot.session.phase), robot.alive ? ", connected" : ", not connected",
-                                 robot.session.localise_only ? ", only localised" : "");
+                                 robot.session.localise_only ? ", only localised" : "",
+                                 robot.session.fragment ? ", not joined with the map" : "");
   if (!robot.session.status.ok()) {
     text += fmt::format("  {}: {}\n", StatusCodeName(robot.session.status.code), robot.session.status.message);
   }

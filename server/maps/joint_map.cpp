@@ -33,11 +33,26 @@ void JointMap::NoteLooks(SessionId session, const slam::OccupancyGrid::Looks& lo
 }
 
 void JointMap::Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
-  for (auto& [key, last] : last_looks_) last.Forget(session);  // What it has drawn lies elsewhere now.
+  ForgetLooksThatMoved(session, chunks);
   for (const auto& [key, chunk] : ChunksOf(session)) {
     if (!chunks.contains(key)) SetLayer(key, session, nullptr);
   }
   for (const auto& [key, chunk] : chunks) SetLayer(key, session, chunk);
+}
+
+// `chunks`: the grid of the session as it is from now on.
+void JointMap::ForgetLooksThatMoved(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
+  for (auto& [key, last] : last_looks_) {
+    if (last.NumberOf(session) == 0) continue;
+    const Layers& layers = chunks_.at(key);
+    const auto before = layers.find(session);
+    const auto now = chunks.find(key);
+    if (before == layers.end() || now == chunks.end()) {
+      last.Forget(session);
+    } else {
+      last.ForgetWhereDifferent(session, *before->second, *now->second);
+    }
+  }
 }
 
 slam::OccupancyGrid::Chunks JointMap::ChunksOf(SessionId session) const {

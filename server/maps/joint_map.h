@@ -35,7 +35,8 @@ class JointMap {
   // others. Who was the last is noted where at least two sessions have drawn, and is not stored: after a restart
   // sessions that go on add up until they look again.
   void Apply(const GridChange& change);
-  // Replaces the whole grid of one session.
+  // Replaces the whole grid of one session, as after its map was corrected. Where it still says the same of a cell that
+  // it has looked at last, it is still the last.
   void Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   [[nodiscard]] slam::OccupancyGrid::Chunks ChunksOf(SessionId session) const;
   // The grids of hidden sessions are kept, but are not part of the sum. A session is shown unless it was hidden.
@@ -94,6 +95,7 @@ class JointMap {
   [[nodiscard]] std::shared_ptr<const slam::GridChunk> SumOf(const Layers& layers, const Counts& counts,
                                                              const LastLooks* last) const;
   void NoteLooks(SessionId session, const slam::OccupancyGrid::Looks& looks);
+  void ForgetLooksThatMoved(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   [[nodiscard]] bool IsShown(const Layers& layers) const;
   void MarkChanged(SessionId session);
   void SetPastOrder(const std::vector<SessionId>& in_order);

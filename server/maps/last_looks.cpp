@@ -40,6 +40,16 @@ void LastLooks::Forget(SessionId session) {
   if (number != 0) Renumber(number, 0);
 }
 
+void LastLooks::ForgetWhereDifferent(SessionId session, const slam::GridChunk& before, const slam::GridChunk& now) {
+  const std::uint8_t number = NumberOf(session);
+  if (number == 0) return;
+  for (std::size_t cell = 0; cell < numbers_.size(); ++cell) {
+    const std::int16_t then = before.log_odds[cell], odds = now.log_odds[cell];
+    const bool same = odds != slam::kUnseen && (then > 0) == (odds > 0);
+    if (numbers_[cell] == number && !same) numbers_[cell] = 0;
+  }
+}
+
 std::uint8_t LastLooks::NumberOf(SessionId session) const {
   const auto found = std::ranges::find(sessions_, session);
   return found == sessions_.end() ? std::uint8_t{0} : static_cast<std::uint8_t>(found - sessions_.begin() + 1);

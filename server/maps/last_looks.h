@@ -8,6 +8,7 @@
 #include "common/map/tile.h"
 #include "server/maps/robot_grid.h"
 #include "server/slam/grid/cell_mask.h"
+#include "server/slam/grid/occupancy_grid.h"
 
 namespace cairn::server {
 
@@ -18,6 +19,8 @@ class LastLooks {
   // What the session has looked at last counts as looked at by `by`.
   void Replace(SessionId session, SessionId by);
   void Forget(SessionId session);
+  // What the session has drawn in the chunk is drawn again: where it says something else now, it forgets.
+  void ForgetWhereDifferent(SessionId session, const slam::GridChunk& before, const slam::GridChunk& now);
 
   // By cell: 0 where nobody is known to be the last, else the number that NumberOf gives the last session.
   [[nodiscard]] const std::array<std::uint8_t, kTileArea>& numbers() const { return numbers_; }

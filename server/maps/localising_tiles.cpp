@@ -59,6 +59,12 @@ std::shared_ptr<const slam::KnownGrid> KnownGridOf(std::span<const TileSet::Tile
   return std::make_shared<const slam::KnownGrid>(std::move(source), options, near_m);
 }
 
+bool IsSmallEnoughToLocaliseIn(const MapSnapshot& map) {
+  const auto box = map.tiles.BoxOf(0);
+  const double side_m = map.info.resolution_m * kTileCells;
+  return !box || (std::max(box->x_max - box->x_min, box->y_max - box->y_min) + 1) * side_m <= slam::KnownGrid::kMostM;
+}
+
 std::vector<TileSet::TilePtr> TilesToLocaliseIn(const MapSnapshot& map) {
   const EditOverlay overlay = OverlayWithoutWalls(*map.edits, map.info.resolution_m);
   std::vector<TileSet::TilePtr> tiles;

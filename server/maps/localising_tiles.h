@@ -18,6 +18,8 @@ namespace cairn::server {
 // Those of the tiles of which a part lies within `reach_m` of a point, in x and in y.
 [[nodiscard]] std::vector<TileSet::TilePtr> TilesNear(std::span<const TileSet::TilePtr> tiles, double resolution_m,
                                                       const Eigen::Vector2d& p_map, double reach_m);
+// Whether the map is small enough for that (slam::KnownGrid::kMostM).
+[[nodiscard]] bool IsSmallEnoughToLocaliseIn(const MapSnapshot& map);
 // The map that tiles of level 0 show. Tiles that cannot be read are left out. Null: it is larger than a search allows
 // (slam::KnownGrid::IsBounded). `near_m`: as slam::SelfCheckOptions. `shared`: where the same map may be already; null:
 // it is made.

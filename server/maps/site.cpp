@@ -12,6 +12,12 @@
 #include "server/maps/tile_encoding.h"
 
 namespace cairn::server {
+namespace {
+
+constexpr char kLeftAlone[] =
+    "chosen by a person, so no job changes the map by itself until the next `cairn job smooth`";
+
+}  // namespace
 
 Site::Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
            Outbound& outbound, Journal* journal, Generation generation, const Beginning& beginning)
@@ -311,6 +317,10 @@ MapInfo Site::InfoOf(const TileSet& tiles) const {
   info.robots = static_cast<std::uint32_t>(robots.size());
   info.enabled_version = versions_.enabled();
   info.versions = versions_.infos();
+  if (chosen_) {
+    const auto enabled = std::ranges::find(info.versions, info.enabled_version, &MapVersionInfo::version);
+    if (enabled != info.versions.end()) enabled->note += std::string(enabled->note.empty() ? "" : "; ") + kLeftAlone;
+  }
   info.edits_version = edits_.version();
   if (const auto box = tiles.BoxOf(0)) {
     const double tile_m = kTileCells * resolution_m_;

@@ -42,6 +42,7 @@ void Site::Begin(std::uint32_t version, Done done, bool chosen) {
   if (version == versions_.enabled()) {
     chosen_ = chosen_ || chosen;
     StoreSite();
+    Refresh({}, {}, false);  // The notes of the versions say so.
     return done(version);
   }
   switch_.emplace();

@@ -55,6 +55,12 @@ void PoseHistory::Append(const PathPose& pose) {
     static_cast<void>((*full_)[moved_++]->poses());
 }
 
+void PoseHistory::Clear() {
+  full_ = std::make_shared<const std::vector<PathView::Block>>();
+  tail_ = {};
+  size_ = moved_ = 0;
+}
+
 PathView PoseHistory::view() const {
   return {full_, std::make_shared<const PoseBlock>(tail_)};
 }

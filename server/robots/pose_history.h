@@ -58,6 +58,8 @@ class PoseHistory {
   // `moves_rest`: what comes after the last of them moves with that one; otherwise it stays. `fragment`:
   // PathMove::fragment. Takes less than a microsecond for each of `now` and each block.
   void MoveOnto(std::span<const StampedPose> now, bool moves_rest, std::optional<bool> fragment);
+  // Forgets all poses. Views that were taken stay as they are.
+  void Clear();
   [[nodiscard]] PathView view() const;
   [[nodiscard]] std::size_t size() const { return size_; }
 

@@ -11,7 +11,7 @@ struct RobotsOptions {
   std::int64_t max_robots = 256;
   std::int64_t queue_scans = 64;
   std::int64_t queue_odometry = 1024;
-  std::int64_t max_path_poses = 1000000;
+  std::int64_t max_path_poses = 131072;
   std::int64_t max_unclaimed = 256;
   std::int64_t max_earlier = 32;
   double suspended_expiry_s = 86400.0;

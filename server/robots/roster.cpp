@@ -3,11 +3,13 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <optional>
 #include <utility>
 
 #include "common/service/start_pose.h"
+#include "server/maps/localising_tiles.h"
 #include "server/ops/log_context.h"
 #include "server/store/crash_note.h"
 
@@ -246,6 +248,10 @@ Result<void> Roster::Localise(const std::string& robot, bool only, const std::sh
   const auto site = atlas_.Find((*session)->record().state().site);
   const auto map = site != nullptr ? site->snapshot() : nullptr;
   if (map == nullptr || !map->drawn) return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
+  if (!IsSmallEnoughToLocaliseIn(*map))
+    return Fail(StatusCode::kFailedPrecondition, "the map of its site is wider than " +
+                                                     std::to_string(std::lround(slam::KnownGrid::kMostM)) +
+                                                     " m: robots are localised in smaller ones only");
   return (*session)->Localise(map, receipt);
 }
 
@@ -337,6 +343,7 @@ void Roster::RetireGone() {
     }
     if (!retired) return false;
     if (leaving.keep && HasDrawn(*gone)) {
+      gone->record().ForgetPath();  // Nobody can ask for it any more, and a pose takes 104 bytes.
       earlier_.emplace(gone->id(), gone);
     } else {
       freed.push_back(gone);

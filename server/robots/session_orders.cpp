@@ -1,6 +1,7 @@
 // What people and other parts of the server tell a session's estimator to do (session.h).
 #include <utility>
 
+#include "server/maps/localising_tiles.h"
 #include "server/robots/session.h"
 
 namespace cairn::server {
@@ -91,6 +92,7 @@ void Session::KeepUpWith(const std::shared_ptr<const MapSnapshot>& map) {
   const bool drawn = since > kDrawnPeriod && known_map_ && known_map_->version != map->info.version;
   const bool edited = since > kEditedPeriod && known_map_ && known_map_->edits_version != map->info.edits_version;
   if (!moved && !drawn && !edited) return;
+  if (!IsSmallEnoughToLocaliseIn(*map)) return;         // It goes on in the map as it was while it was small enough.
   if (!queue_.Push(LocaliseWanted{map, true})) return;  // The next call tries again.
   known_map_ = {map->info.epoch, map->info.version, map->info.edits_version, now};
   Schedule();

@@ -227,6 +227,11 @@ void SessionRecord::MovePath(std::span<const StampedPose> now, bool moves_rest, 
   history_.MoveOnto(now, moves_rest, fragment);
 }
 
+void SessionRecord::ForgetPath() {
+  const MutexLock lock(mutex_);
+  history_.Clear();
+}
+
 void SessionRecord::LoseLast() {
   const MutexLock lock(mutex_);
   hypotheses_.clear();

@@ -113,6 +113,8 @@ class SessionRecord {
   void MoveLast(const Pose2& T_new_old);
   // The map around the whole path has moved: the path follows (PoseHistory::MoveOnto).
   void MovePath(std::span<const StampedPose> now, bool moves_rest, std::optional<bool> fragment);
+  // Frees what the path takes. From then on the snapshot's path is empty.
+  void ForgetPath();
   // The last pose is not one in the present map.
   void LoseLast();
   void SetMapFrame(std::uint64_t map_frame);

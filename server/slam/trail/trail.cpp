@@ -108,6 +108,8 @@ std::size_t Trail::RevisitsWithin(double way_m, double travelled_m) const {
 
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
   scans_.push_back({stamp, size() - 1, T_keyframe_robot});
+  // A robot that stands makes no keyframes, so that Retire never comes.
+  if (scans_.size() >= 2 * kMostScans + size()) DropOldScans();
 }
 
 void Trail::AddLoop(const PoseRelation& loop) {

@@ -47,6 +47,8 @@ class Trail {
   void ConfirmTentative();
   // The keyframes as they would be after ConfirmTentative.
   [[nodiscard]] std::vector<Keyframe> ConfirmedKeyframes() const;
+  // Of so many scans at least the places are kept; of earlier ones only those that are keyframes.
+  static constexpr std::size_t kMostScans = 1 << 17;  // 5 MiB.
   // Appends a scan with its pose relative to the last keyframe. REQUIRES: not empty.
   void AddScan(Stamp stamp, const Pose2& T_keyframe_robot);
   // Adds a large loop that was used to correct the path.
@@ -124,6 +126,7 @@ class Trail {
   // Whether what was read fits together.
   [[nodiscard]] bool IsConsistent() const;
   void RestoreRest();
+  void DropOldScans();
 
   static constexpr std::size_t kMaxCachedPoints = 1 << 18;  // 8 MiB.
 
@@ -139,7 +142,7 @@ class Trail {
   mutable bool distances_current_ = true;
   std::vector<MapperSnapshot::ScanPlace> scans_;
   // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative, the relations in
-  // SetShape, and in Retire.
+  // SetShape, the scans in DropOldScans, and in Retire.
   FrozenBlocks<Keyframe> frozen_keyframes_;
   FrozenBlocks<KeyframeShape> frozen_shapes_;
   FrozenBlocks<PoseRelation> frozen_relations_;

@@ -18,7 +18,6 @@ constexpr double kPlaceSigmaRad = 0.01;
 // would grow without end in number and, as they repeat each other, in weight.
 constexpr std::size_t kEnoughLoops = 12;
 // Of more scans between keyframes than this the older ones are given up.
-constexpr std::size_t kMostScans = 1 << 17;  // 5 MiB.
 
 // The connected components of a graph of keyframes (union-find).
 class Components {
@@ -96,19 +95,22 @@ void Trail::Retire(const Retirement& retirement) {
       scan.T_keyframe_robot = retirement.T_representative_keyframe[scan.keyframe] * scan.T_keyframe_robot;
     scan.keyframe = retirement.index_after[scan.keyframe];
   }
-  if (scans_.size() > kMostScans) {
-    const auto end = scans_.end() - static_cast<std::ptrdiff_t>(kMostScans);
-    scans_.erase(
-        std::remove_if(scans_.begin(), end, [](const auto& scan) { return !(scan.T_keyframe_robot == Pose2{}); }), end);
-    scans_.shrink_to_fit();
-  }
+  DropOldScans();
   KeepOnly(keyframes_, retirement);
   KeepOnly(shapes_, retirement);
   frozen_keyframes_.Forget();
   frozen_shapes_.Forget();
   frozen_relations_.Forget();
-  frozen_scans_.Forget();
   RestoreRest();
+}
+
+void Trail::DropOldScans() {
+  frozen_scans_.Forget();
+  if (scans_.size() <= kMostScans) return;
+  const auto end = scans_.end() - static_cast<std::ptrdiff_t>(kMostScans);
+  scans_.erase(
+      std::remove_if(scans_.begin(), end, [](const auto& scan) { return !(scan.T_keyframe_robot == Pose2{}); }), end);
+  scans_.shrink_to_fit();
 }
 
 }  // namespace cairn::slam

@@ -81,6 +81,29 @@ TEST(JointMap, OfTwoRobotsThatGoOnTheOneThatLookedLastIsBelieved) {
   EXPECT_TRUE(map.cells().empty());
 }
 
+// After a correction that has hardly moved it, as a job makes one every 200 m.
+TEST(JointMap, AGridThatIsDrawnAgainIsStillTheOneThatLookedLastWhereItSaysTheSame) {
+  JointMap map(kPast);
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(300)}}, .looks = {{{0, 0}, MaskOf({0, 1, 2})}}});
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(-300)}}, .looks = {{{0, 0}, MaskOf({0, 1, 2})}}});
+  const auto cell = [&map](std::size_t index) {
+    map.Render();
+    return (*map.cells().at({0, 0, 0}))[index];
+  };
+  ASSERT_LT(cell(0), 30);
+  auto again = std::make_shared<slam::GridChunk>(*ChunkOf(-250));
+  again->log_odds[1] = 250;
+  again->log_odds[2] = slam::kUnseen;
+  map.Replace(2, {{{0, 0}, again}});
+  EXPECT_LT(cell(0), 30);
+  EXPECT_GT(cell(1), 90) << "it says something else";
+  EXPECT_GT(cell(2), 90) << "it has not seen this";
+  map.Replace(1, {{{0, 0}, ChunkOf(280)}});
+  EXPECT_LT(cell(0), 30) << "the other one was the last";
+  map.Replace(2, {{{1, 0}, again}});
+  EXPECT_GT(cell(0), 90) << "it has drawn nothing there";
+}
+
 // What a session with a frame of its own has looked at is somewhere else, and so is what was drawn again.
 TEST(JointMap, LooksOfAHiddenSessionDoNotCount) {
   JointMap map(kPast);

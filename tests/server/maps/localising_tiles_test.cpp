@@ -49,5 +49,28 @@ TEST(LocalisingTiles, WallsThatPeopleDrewAreUnknownAndAllElseIsAsItIs) {
   EXPECT_EQ(TilesToLocaliseIn(map)[0], map.tiles.Find({0, 0, 0})) << "without walls the tiles are those of the map";
 }
 
+TEST(LocalisingTiles, AMapWiderThanASearchAllowsIsTooLarge) {
+  TileCells cells;
+  cells.fill(0);
+  const double side_m = 0.05 * kTileCells;
+  const int most = static_cast<int>(slam::KnownGrid::kMostM / side_m);  // Tiles in a row.
+  const auto with = [&](int x, int y) {
+    MapSnapshot map;
+    map.info.resolution_m = 0.05;
+    map.tiles = map.tiles.With(
+        {{{0, 0, 0}, EncodeTile({0, 0, 0}, cells, 1, 1)}, {{0, x, y}, EncodeTile({0, x, y}, cells, 1, 1)}});
+    return IsSmallEnoughToLocaliseIn(map);
+  };
+  EXPECT_TRUE(IsSmallEnoughToLocaliseIn({}));
+  for (const int far : {most - 1, 1 - most}) {
+    EXPECT_TRUE(with(far, 0));
+    EXPECT_TRUE(with(0, far));
+  }
+  for (const int far : {most, -most}) {
+    EXPECT_FALSE(with(far, 0));
+    EXPECT_FALSE(with(0, far));
+  }
+}
+
 }  // namespace
 }  // namespace cairn::server

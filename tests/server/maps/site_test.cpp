@@ -306,6 +306,11 @@ TEST_F(SiteTest, NoAlignmentReplacesTheVersionThatAPersonHasChosen) {
         version, [&enabled](Result<std::uint32_t> result) { enabled.set_value(std::move(result)); }, {}, by);
     return enabled.get_future().get();
   };
+  const auto says_so = [this](std::uint32_t version) {
+    const auto versions = site_->snapshot()->info.versions;
+    const auto found = std::ranges::find(versions, version, &MapVersionInfo::version);
+    return found != versions.end() && found->note.find("chosen by a person") != std::string::npos;
+  };
   EXPECT_TRUE(site_->MayBeAligned());
   const std::uint32_t first = AddVersion({{1, {{{{0, 0}, UniformChunk(100)}}, 3}}});
   EXPECT_FALSE(site_->MayBeAligned()) << "a person has not decided about it";
@@ -317,8 +322,13 @@ TEST_F(SiteTest, NoAlignmentReplacesTheVersionThatAPersonHasChosen) {
   EXPECT_FALSE(site_->MayBeAligned());
   EXPECT_EQ(enable_by(second, Site::EnabledBy::kAlignment).error().code, StatusCode::kFailedPrecondition);
   EXPECT_EQ(site_->snapshot()->info.enabled_version, first);
+  EXPECT_TRUE(says_so(first));
+  EXPECT_FALSE(says_so(second));
   EXPECT_TRUE(enable_by(second, Site::EnabledBy::kJob));
   EXPECT_TRUE(site_->MayBeAligned());
+  EXPECT_FALSE(says_so(first) || says_so(second));
+  EXPECT_TRUE(enable_by(second, Site::EnabledBy::kPerson)) << "it is enabled already";
+  EXPECT_TRUE(says_so(second));
 }
 
 // At the end of a server. The last changes were lost where Publish had been asked for before them and still waited.

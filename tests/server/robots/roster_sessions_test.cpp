@@ -149,6 +149,7 @@ TEST_F(RosterTest, TheEarlierSessionOfARobotStillAnswersForItsSite) {
   EXPECT_EQ(roster().All().size(), 1U);
   const auto sessions = roster().InSite("lab");
   ASSERT_EQ(sessions.size(), 2U);
+  EXPECT_TRUE(sessions[0]->record().snapshot().path.empty()) << "nobody can ask for it";
   std::promise<std::size_t> keyframes;
   ASSERT_TRUE(sessions[0]->Post(
       SnapshotWanted{[&](SessionMaterial&& material) { keyframes.set_value(material.snapshot.keyframes.size()); }}));

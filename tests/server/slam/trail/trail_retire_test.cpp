@@ -1,7 +1,9 @@
 // What a trail hands over when it gives up keyframes. The robot drives round and round on a circle.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numbers>
 #include <set>
@@ -149,6 +151,39 @@ TEST(TrailRetire, RelationsDoNotGrowWithoutEnd) {
     driven += 2 * kPerRound;
   }
   EXPECT_LE(after_last, after_first + after_first / 4);
+}
+
+// Nothing new is seen, so that no keyframe is given up for days.
+TEST(TrailRetire, TheScansOfARobotThatStandsAreBounded) {
+  Trail trail(kStepNoise);
+  DriveOn(trail, 0, 10);
+  const auto most = static_cast<Stamp>(Trail::kMostScans);
+  const Stamp first = 100, end = first + 4 * most;
+  std::size_t largest = 0;
+  for (Stamp stamp = first; stamp < end; ++stamp) {
+    trail.AddScan(stamp, {0.01, 0.0, 0.0});
+    largest = std::max(largest, trail.scans().size());
+    if (stamp != first + most) continue;
+    StateWriter writer;  // The blocks of a checkpoint are shared with the next one.
+    writer(trail);
+  }
+  EXPECT_LE(largest, 2 * Trail::kMostScans + trail.size());
+  const auto& scans = trail.scans();
+  ASSERT_GE(scans.size(), Trail::kMostScans + 10);
+  EXPECT_TRUE(std::ranges::is_sorted(scans, std::less_equal<>(), &MapperSnapshot::ScanPlace::stamp));
+  for (std::size_t k = 0; k < 10; ++k) EXPECT_EQ(scans[k].stamp, static_cast<Stamp>(2 * k)) << "that of a keyframe";
+  for (Stamp back = 0; back < most; ++back)
+    ASSERT_EQ(scans[scans.size() - 1 - static_cast<std::size_t>(back)].stamp, end - 1 - back);
+
+  StateWriter writer;
+  writer(trail);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes);
+  Trail read(kStepNoise);
+  reader(read);
+  ASSERT_TRUE(reader.ok()) << reader.failed();
+  ASSERT_EQ(read.scans().size(), scans.size());
+  for (std::size_t i = 0; i < scans.size(); ++i) ASSERT_EQ(read.scans()[i].stamp, scans[i].stamp);
 }
 
 TEST(TrailRetire, IsReadAgainAsItWas) {
