@@ -234,11 +234,14 @@ void LogCheck::CollectLidarFindings() {
                      turns.lag_s > 0.0 ? "later" : "earlier"),
          measure});
   const bool slow = r.scans.rate_hz > 0.0 && r.scans.rate_hz < kSlow_hz;
-  if (!r.beams_timed && slow && r.field_of_view_rad > kFullTurn_rad && r.turned_rad > 1.0)
+  // Without odometry nothing says that the robot does not turn.
+  const bool turns_itself = r.odometry.count == 0 || r.turned_rad > 1.0;
+  if (!r.beams_timed && slow && r.field_of_view_rad > kFullTurn_rad && turns_itself)
     report_.findings.push_back(
         {false,
          fmt::format("nothing says when the beams of a turn of up to {:.2f} s were measured", 1.0 / r.scans.rate_hz),
-         "give --scan-period and the other options of lidars that turn; " + measure});
+         "if the lidar turns, give --scan-period and the other options of lidars that turn; " +
+             (r.odometry.count > 0 ? measure : "its data sheet says how long a turn takes")});
 }
 
 void AddCheckLog(CLI::App& app, Program& program) {

@@ -94,8 +94,12 @@ LidarTiming Merge(const LidarTiming& over, const LidarTiming& under) {
 }
 
 Result<void> PutInOrderOfTime(const LidarTiming& timing, Scan& scan) {
-  const double period_s = timing.scan_period_s.value_or(0.0);
-  if (period_s <= 0.0 || !HasGrid(scan)) return {};
+  if (!HasGrid(scan)) return {};
+  // Of the scan itself, where something else is said of its times.
+  const bool said = timing.stamp_at || timing.clockwise || timing.turn_from_rad;
+  const double own_period_s = said ? std::abs(scan.beam_period_s) * kTurn / std::abs(scan.angle_step_rad) : 0.0;
+  const double period_s = timing.scan_period_s.value_or(own_period_s);
+  if (period_s <= 0.0) return {};
   Scan timed = scan;
   if (timing.clockwise.value_or(timed.angle_step_rad < 0.0) != (timed.angle_step_rad < 0.0)) Reverse(timed);
   if (timing.turn_from_rad)

@@ -18,7 +18,8 @@ namespace cairn {
 // Which beam of a scan its stamp belongs to.
 enum class StampAt : std::uint8_t { kFirst, kMiddle, kLast };
 
-// Values that are not set are unknown. Without scan_period_s the others are ignored, and scans stay as they are.
+// Values that are not set are unknown. Without scan_period_s the others count for scans that say themselves how long a
+// turn takes (Scan::beam_period_s), as those of bags; other scans stay as they are.
 struct LidarTiming {
   std::optional<double> scan_period_s;  // Of a full turn, whatever part of it is measured. 0: all beams at once.
   std::optional<StampAt> stamp_at;      // Not set: kFirst.

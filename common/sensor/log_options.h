@@ -74,7 +74,11 @@ void AddLogOptions(Command& command, LogReaderOptions& options) {
   timing("scan-period",
          "Time of a full turn of the lidar, where the beams were measured one after the other; 0: all at once",
          "SECONDS");
-  timing("stamp-at", "When the stamp of a scan was taken: at its first, middle or last beam", "first|middle|last");
+  timing(
+      "stamp-at",
+      "When the stamp of a scan was taken: at its first, middle or last beam. This and the next two count only where "
+      "--scan-period or the log says how long a turn takes",
+      "first|middle|last");
   command.add_flag_function(
       "--clockwise,!--counter-clockwise", [&options](auto count) { options.timing.clockwise = count > 0; },
       "How the lidar turned, seen from above; without this, in the order of the logged beams");

@@ -57,6 +57,25 @@ TEST(LidarTiming, WithoutAPeriodAScanStaysAsItIs) {
   }
 }
 
+// As in a bag whose driver says how long a turn takes, and stamps its end.
+TEST(LidarTiming, AScanThatSaysItsPeriodItselfIsPutInOrderWithoutOne) {
+  Scan logged = Logged(-180, 1, 360);
+  logged.beam_period_s = 0.0005;
+  Scan scan = logged;
+  ASSERT_TRUE(PutInOrderOfTime({}, scan));
+  EXPECT_EQ(scan.stamp, logged.stamp);
+  LidarTiming timing;
+  Set(timing, "stamp-at", "last");
+  ASSERT_TRUE(PutInOrderOfTime(timing, scan));
+  EXPECT_NEAR(scan.beam_period_s, 0.0005, 1e-12);
+  EXPECT_EQ(logged.stamp - scan.stamp, 179'500'000);
+  EXPECT_EQ(scan.ranges_m, logged.ranges_m);
+  scan = logged;
+  Set(timing, "scan-period", "0");
+  ASSERT_TRUE(PutInOrderOfTime(timing, scan));
+  EXPECT_EQ(scan.stamp, logged.stamp) << "all at once was asked for";
+}
+
 // The array runs counter-clockwise from -180 deg, while the lidar turned clockwise from straight ahead.
 TEST(LidarTiming, AnArrayThatWasTurnedOverIsPutInOrderOfTime) {
   LidarTiming timing;
