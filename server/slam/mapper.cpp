@@ -70,6 +70,10 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
   if (keyframe) {
     s.front_end.AddKeyframe(view);
     s.AddKeyframe({std::move(still), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
+  } else if (s.loops.busy()) {
+    s.Begin(ScanStep::kLargeLoop);
+    s.CloseLargeLoop(false);
+    s.Begin(ScanStep::kOther);
   }
   return s.Report(stamp, T_odom_robot, step, keyframe);
 }
@@ -102,7 +106,7 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
 
   Begin(ScanStep::kLargeLoop);
-  CloseLargeLoop();
+  CloseLargeLoop(true);
   Begin(ScanStep::kSelfCheck);
   self_check.Look(trail, believed_index());
   Begin(ScanStep::kDraw);
@@ -126,10 +130,10 @@ StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& st
 }
 
 // Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path.
-void Mapper::State::CloseLargeLoop() {
+void Mapper::State::CloseLargeLoop(bool keyframe) {
   if (!filter->rebases()) return;
   const PosePath believed = believed_path();
-  const auto loop = loops.Find(trail, believed);
+  const auto loop = keyframe ? loops.Find(trail, believed) : loops.GoOn(trail);
   if (!loop) return;
   const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
   if (!path) return;  // The loop is not stored, so that it will be searched for again.

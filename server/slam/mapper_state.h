@@ -126,7 +126,8 @@ struct Mapper::State {
   [[nodiscard]] Eigen::Matrix3d DoubtOfStep(const Pose2& T_prev_curr) const;
   [[nodiscard]] RevisitObservation SeenFromNearest(const FoundPlace& place) const;
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
-  void CloseLargeLoop();
+  // Does the next part of the search for one. `keyframe`: the present scan is one.
+  void CloseLargeLoop(bool keyframe);
   void RetireKeyframes();
   void Follow(std::span<const Pose2> first_poses, std::uint64_t made);
   void MoveTo(std::span<const Pose2> path, const Pose2& T_map_last);

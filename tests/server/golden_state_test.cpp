@@ -25,7 +25,7 @@ Request OfLab(RequestKind kind) {
 }
 
 // A new format needs a state directory in tests/golden that was written with it; one of site files, a saved site.
-static_assert(slam::kCheckpointFormat == 14);
+static_assert(slam::kCheckpointFormat == 15);
 static_assert(kRecordFormat == 2);
 static_assert(kSiteFileFormat == 2);
 
@@ -96,14 +96,15 @@ INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
                          ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9",
                                            "state-1-checkpoints-10", "state-1-checkpoints-10-dpslam",
                                            "state-1-checkpoints-11-dpslam", "state-1-checkpoints-12",
-                                           "state-1-checkpoints-13", "state-1-checkpoints-14", "state-1-ended"),
+                                           "state-1-checkpoints-13", "state-1-checkpoints-14", "state-1-checkpoints-15",
+                                           "state-1-ended"),
                          kNameOf);
 
 class GoldenEndedCheckpoint : public GoldenState {};
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEndedCheckpoint,
                          ::testing::Values("state-1-checkpoints-10", "state-1-checkpoints-11-dpslam",
-                                           "state-1-checkpoints-12", "state-1-checkpoints-13",
-                                           "state-1-checkpoints-14"),
+                                           "state-1-checkpoints-12", "state-1-checkpoints-13", "state-1-checkpoints-14",
+                                           "state-1-checkpoints-15"),
                          kNameOf);
 
 TEST_P(GoldenEndedCheckpoint, TheEndIsRestoredFromTheCheckpointAlone) {

@@ -12,8 +12,12 @@ namespace {
 
 // Half or twice of each of these changes the results on the first 4500 scans of mit-killian no more than another seed
 // (study `sensitivity`).
-constexpr std::size_t kMaxCandidates = 2;    // Most old places compared at one keyframe.
+constexpr std::uint32_t kMaxCandidates = 2;  // Most old places compared by one search.
 constexpr std::size_t kCandidateStride = 4;  // Only every fourth old keyframe is a candidate.
+
+constexpr int kBlocksPerScan = 20'000;  // Evaluated in about 2 ms.
+// More than any comparison has.
+constexpr std::uint32_t kMostParts = kMaxBlocks / kBlocksPerScan * 3;
 
 }  // namespace
 
@@ -48,65 +52,139 @@ void Visit(OptionVisitor& visitor, LoopOptions& options) {
 
 LoopSearch::LoopSearch(const LoopOptions& options, const PointToLineOptions& align)
     : options_(options), align_(align) {}
+LoopSearch::~LoopSearch() = default;
 
 double LoopSearch::Reach(double way_m) const {
   return WindowAround({}, way_m, options_).reach_m;
 }
 
-// A keyframe does one comparison at most, because a robot waits for its pose.
+bool LoopSearch::IsConsistent() const {
+  const bool due = candidate_ <= kMaxCandidates && due_ <= Due::kClose;
+  const bool found = (due_ != Due::kConfirm && due_ != Due::kClose) || !unconfirmed_.empty();
+  const bool whole =
+      !comparison_ || ((due_ == Due::kCompare || due_ == Due::kConfirm) && comparison_->since <= comparison_->recent &&
+                       comparison_->way_m >= 0.0 && comparison_->parts_done <= kMostParts);
+  return due && found && whole;
+}
+
 std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
-  const std::size_t now = shapes.size() - 1;
-  const double here_m = shapes[now].travelled_m;
+  const double here_m = shapes.back().travelled_m;
   if (!options_.enabled) return std::nullopt;
-  const auto began = static_cast<std::size_t>(
-      std::ranges::lower_bound(shapes, searched_at_m_, {}, &KeyframeShape::travelled_m) - shapes.begin());
-  if (!unconfirmed_.empty() && unconfirmed_.back().recent >= began &&
-      PartAt(unconfirmed_.back().recent, began).confirms) {
-    const LoopClosure confirmed = SeenFrom(now, unconfirmed_.back(), shapes);
-    unconfirmed_.clear();
-    return confirmed;
+  if (comparison_ || due_ == Due::kClose) return GoOn(trail);
+  if (due_ == Due::kNothing) {
+    if (here_m - searched_at_m_ < options_.every_m) return std::nullopt;
+    searched_at_m_ = here_m;
+    while (!unconfirmed_.empty() && here_m - shapes[unconfirmed_.front().recent].travelled_m > kConfirmWithinM)
+      unconfirmed_.pop_front();
+    candidate_ = 0;
+    due_ = Due::kCompare;
   }
-  const Part part = PartAt(now, began);
-  if (now > began && part.candidate < kMaxCandidates) {
-    if (!part.confirms) {
-      CompareCandidate(part.candidate, trail, path);
-    } else if (const LoopClosure closure = SeenFrom(now, unconfirmed_.back(), shapes);
-               Confirms(trail, path, closure, began)) {
-      unconfirmed_.push_back(closure);
-    }
-    return std::nullopt;
-  }
-  if (here_m - searched_at_m_ < options_.every_m) return std::nullopt;
-  searched_at_m_ = here_m;
-  while (!unconfirmed_.empty() && here_m - shapes[unconfirmed_.front().recent].travelled_m > kConfirmWithinM)
-    unconfirmed_.pop_front();
-  CompareCandidate(0, trail, path);
+  due_ == Due::kConfirm ? Confirm(trail, path) : CompareCandidate(trail, path);
   return std::nullopt;
 }
 
-// Each candidate is compared at one keyframe, and if that has found something, it is confirmed at the next one. So what
-// a keyframe does follows from where the search began and at which keyframes something was found, and a restart needs
-// to know no more than that.
-LoopSearch::Part LoopSearch::PartAt(std::size_t keyframe, std::size_t began) const {
-  Part part;
-  for (std::size_t k = began; k < keyframe && part.candidate < kMaxCandidates; ++k) {
-    const bool found = std::ranges::find(unconfirmed_, k, &LoopClosure::recent) != unconfirmed_.end();
-    if (found && !part.confirms) {
-      part.confirms = true;
-    } else {
-      part = {part.candidate + 1, false};
-    }
+// Each scan does one part at most, because a robot waits for its pose.
+std::optional<LoopClosure> LoopSearch::GoOn(const Trail& trail) {
+  if (comparison_) {
+    GoOnComparing(trail);
+    return std::nullopt;
   }
-  return part;
+  if (due_ != Due::kClose) return std::nullopt;
+  const LoopClosure confirmed = SeenFrom(trail.size() - 1, unconfirmed_.back(), trail.shapes());
+  ForgetUnconfirmed();
+  return confirmed;
 }
 
-void LoopSearch::CompareCandidate(std::size_t number, const Trail& trail, const PosePath& path) {
+void LoopSearch::GoOnComparing(const Trail& trail) {
+  if (match_ == nullptr) {  // After a restart: the parts that were done before it are done again.
+    for (std::uint32_t part = std::exchange(comparison_->parts_done, 0); part > 0; --part)
+      if (DoPart(trail)) return;
+  }
+  DoPart(trail);
+}
+
+bool LoopSearch::DoPart(const Trail& trail) {
+  Comparison& comparison = *comparison_;
+  ++comparison.parts_done;
+  const std::span<const KeyframeShape> shapes = trail.shapes();
+  if (match_ == nullptr) {
+    const std::span<const KeyframeShape> until = shapes.first(comparison.recent + 1);
+    Stretch recent_stretch = StretchAround(until, comparison.recent, kStretchM);
+    recent_stretch.first = std::max(recent_stretch.first, comparison.since);
+    if (comparison.old >= recent_stretch.first) {  // This is the present place, not an old one.
+      End(std::nullopt, shapes);
+      return true;
+    }
+    const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), comparison.old, kStretchM);
+    match_ = std::make_unique<StretchMatch>(trail, old_stretch, trail, recent_stretch,
+                                            WindowAround(comparison.T_old_recent_guess, comparison.way_m, options_),
+                                            options_.max_rival);
+    return false;
+  }
+  if (!match_->GoOn(trail, trail, kBlocksPerScan, options_, align_)) return false;
+  std::optional<LoopClosure> found;
+  if (match_->found())
+    found = {comparison.old, comparison.recent, *match_->found(), PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
+  End(found, shapes);
+  return true;
+}
+
+void LoopSearch::End(const std::optional<LoopClosure>& found, std::span<const KeyframeShape> shapes) {
+  const std::size_t recent = comparison_->recent;
+  comparison_.reset();
+  match_.reset();
+  if (!found) return GoToNextCandidate();
+  if (due_ == Due::kCompare) {
+    unconfirmed_.push_back(*found);
+    due_ = Due::kConfirm;
+    return;
+  }
+  const LoopClosure closure = SeenFrom(recent, unconfirmed_.back(), shapes);
+  const LoopClosure* const earlier = Earlier(closure, shapes);
+  if (earlier == nullptr || !Agree(*earlier, *found, shapes)) return GoToNextCandidate();
+  unconfirmed_.push_back(closure);
+  due_ = Due::kClose;
+}
+
+void LoopSearch::GoToNextCandidate() {
+  ++candidate_;
+  due_ = candidate_ < kMaxCandidates ? Due::kCompare : Due::kNothing;
+}
+
+void LoopSearch::CompareCandidate(const Trail& trail, const PosePath& path) {
   const std::vector<std::size_t> candidates = Candidates(trail, path);
-  if (number >= candidates.size()) return;
-  const std::size_t old = candidates[number];
-  const Pose2 guess = Between(path[old], path[trail.size() - 1]);
-  if (const auto closure = Compare(trail, old, guess, 0)) unconfirmed_.push_back(*closure);
+  if (candidate_ >= candidates.size()) return GoToNextCandidate();
+  const std::size_t old = candidates[candidate_], now = trail.size() - 1;
+  comparison_ = {old, now, 0, Between(path[old], path[now]), trail.distances_m()[old]};
+}
+
+// Two stretches of 15 m that end some metres apart show nearly the same. Where that looks like another place, both
+// agree on the wrong one. So what has been seen since the earlier of the two must show the same by itself.
+void LoopSearch::Confirm(const Trail& trail, const PosePath& path) {
+  const std::span<const KeyframeShape> shapes = trail.shapes();
+  const std::size_t now = shapes.size() - 1;
+  const LoopClosure closure = SeenFrom(now, unconfirmed_.back(), shapes);
+  const LoopClosure* const earlier = Earlier(closure, shapes);
+  if (earlier == nullptr) return GoToNextCandidate();
+  const Pose2 guess = Between(path[closure.old], path[now]);
+  comparison_ = {closure.old, now, earlier->recent + 1, guess, trail.distances_m()[closure.old]};
+}
+
+const LoopClosure* LoopSearch::Earlier(const LoopClosure& closure, std::span<const KeyframeShape> shapes) const {
+  for (const LoopClosure& earlier : unconfirmed_) {
+    if (shapes[earlier.recent].travelled_m >= searched_at_m_) break;
+    if (shapes[closure.recent].travelled_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
+    if (Agree(earlier, closure, shapes)) return &earlier;  // The earliest one, since which the robot has seen the most.
+  }
+  return nullptr;
+}
+
+void LoopSearch::ForgetUnconfirmed() {
+  unconfirmed_.clear();
+  due_ = Due::kNothing;
+  comparison_.reset();
+  match_.reset();
 }
 
 LoopClosure LoopSearch::SeenFrom(std::size_t keyframe, const LoopClosure& closure,
@@ -116,8 +194,15 @@ LoopClosure LoopSearch::SeenFrom(std::size_t keyframe, const LoopClosure& closur
 }
 
 void LoopSearch::Retire(const Retirement& retirement) {
-  std::erase_if(unconfirmed_,
-                [&](const LoopClosure& one) { return !retirement.IsKept(one.old) || !retirement.IsKept(one.recent); });
+  const auto stays = [&](const LoopClosure& one) {
+    return retirement.IsKept(one.old) && retirement.IsKept(one.recent);
+  };
+  // What is due with the last loop found cannot be done without it.
+  const bool of_found = due_ == Due::kConfirm || due_ == Due::kClose;
+  if (comparison_ || (of_found && !stays(unconfirmed_.back()))) due_ = Due::kNothing;
+  comparison_.reset();  // Its stretches are no longer what they were.
+  match_.reset();
+  std::erase_if(unconfirmed_, [&](const LoopClosure& one) { return !stays(one); });
   for (LoopClosure& one : unconfirmed_) {
     one.old = retirement.index_after[one.old];
     one.recent = retirement.index_after[one.recent];
@@ -141,38 +226,6 @@ std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePa
   };
   path.ForEach(shapes.size(), enter, look);
   return best.Take();
-}
-
-// Two stretches of 15 m that end some metres apart show nearly the same. Where that looks like another place, both
-// agree on the wrong one. So what has been seen since the earlier of the two must show the same by itself.
-bool LoopSearch::Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure,
-                          std::size_t before) const {
-  const std::span<const KeyframeShape> shapes = trail.shapes();
-  const Pose2 guess = Between(path[closure.old], path[closure.recent]);
-  for (const LoopClosure& earlier : unconfirmed_) {
-    if (earlier.recent >= before) break;
-    if (shapes[closure.recent].travelled_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
-    if (!Agree(earlier, closure, shapes)) continue;
-    // It is the earliest one, since which the robot has seen the most.
-    const auto alone = Compare(trail, closure.old, guess, earlier.recent + 1);
-    return alone && Agree(earlier, *alone, shapes);
-  }
-  return false;
-}
-
-std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old, const Pose2& T_old_recent_guess,
-                                               std::size_t since) const {
-  const std::span<const KeyframeShape> shapes = trail.shapes();
-  const double way_m = trail.distances_m()[old];
-  const std::size_t now = shapes.size() - 1;
-  Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
-  recent_stretch.first = std::max(recent_stretch.first, since);
-  if (old >= recent_stretch.first) return std::nullopt;  // This is the present place, not an old one.
-  const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
-  const auto T_old_recent = MatchStretches(trail, old_stretch, trail, recent_stretch,
-                                           WindowAround(T_old_recent_guess, way_m, options_), options_, align_);
-  if (!T_old_recent) return std::nullopt;
-  return LoopClosure{old, now, *T_old_recent, PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
 }
 
 bool LoopSearch::Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const {

@@ -8,7 +8,10 @@
 // form.
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -52,43 +55,70 @@ struct LoopClosure {
   }
 };
 
+class StretchMatch;
+
 class LoopSearch {
  public:
   explicit LoopSearch(const LoopOptions& options, const PointToLineOptions& align);
+  ~LoopSearch();
 
-  // Returns a large loop that the last keyframe closes, once it is confirmed. To be called once after each keyframe,
-  // because a search is done in parts, one with each. `path` is the believed path, one pose T_map_robot per keyframe.
+  // To be called once after each keyframe. Returns a large loop that the last keyframe closes, if one is confirmed.
+  // `path` is the believed path, one pose T_map_robot per keyframe.
   [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const PosePath& path);
+  // Whether it is comparing two stretches, or a loop is due to be closed. A comparison is done in parts, one with each
+  // scan, whose time is bounded.
+  [[nodiscard]] bool busy() const { return comparison_ || due_ == Due::kClose; }
+  // To be called after each other scan: does the next part. Returns as Find.
+  [[nodiscard]] std::optional<LoopClosure> GoOn(const Trail& trail);
 
   // The front-end has not followed the robot from the last keyframe to the next one: what was found before says nothing
   // of where the robot is now.
-  void ForgetUnconfirmed() { unconfirmed_.clear(); }
-  // Forgets the loops that are not confirmed yet if one of their keyframes is retired.
+  void ForgetUnconfirmed();
+  // Forgets the loops that are not confirmed yet if one of their keyframes is retired, and what is being compared.
   void Retire(const Retirement& retirement);
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.searched_at_m_, self.unconfirmed_);
+    if constexpr (Archive::kReads)
+      if (archive.format() < 15) return;  // A search that was being done is not gone on with.
+    archive(self.candidate_, self.due_, self.comparison_);
+    if constexpr (Archive::kReads)
+      archive.RequireThat([&] { return self.IsConsistent(); }, "the search for large loops");
   }
 
  private:
-  // What a search does with a keyframe: it compares a candidate, or confirms what that comparison has found.
-  struct Part {
-    std::size_t candidate = 0;
-    bool confirms = false;
+  enum class Due : std::uint8_t { kNothing, kCompare, kConfirm, kClose };
+  // Of the surroundings of keyframe `recent`, as seen from keyframe `since` on, with those of `old`. What it has found
+  // so far follows from this and from how many parts of it are done, so that a restart does those again.
+  struct Comparison {
+    std::size_t old = 0;
+    std::size_t recent = 0;
+    std::size_t since = 0;
+    Pose2 T_old_recent_guess;
+    double way_m = 0.0;  // From `old` to `recent` along the known relations.
+    std::uint32_t parts_done = 0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.old, self.recent, self.since, self.T_old_recent_guess, self.way_m, self.parts_done);
+      archive.RequireKeyframe(self.old);
+      archive.RequireKeyframe(self.recent);
+    }
   };
-  // With this keyframe, if the search began with keyframe `began`.
-  [[nodiscard]] Part PartAt(std::size_t keyframe, std::size_t began) const;
-  // Compares the old keyframe that is the n-th best candidate.
-  void CompareCandidate(std::size_t number, const Trail& trail, const PosePath& path);
+  [[nodiscard]] bool IsConsistent() const;
+  void GoOnComparing(const Trail& trail);
+  // Of the comparison that is being done. Returns whether that has ended.
+  bool DoPart(const Trail& trail);
+  void End(const std::optional<LoopClosure>& found, std::span<const KeyframeShape> shapes);
+  // Begins to compare the old keyframe that is the next best candidate.
+  void CompareCandidate(const Trail& trail, const PosePath& path);
+  // Begins to compare once more what the last comparison has found.
+  void Confirm(const Trail& trail, const PosePath& path);
+  void GoToNextCandidate();
   [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const PosePath& path) const;
-  // Compares the surroundings of the last keyframe, as seen from keyframe `since` on, with those of `old`.
-  [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old, const Pose2& T_old_recent_guess,
-                                                   std::size_t since) const;
-  // Whether an unconfirmed loop, found before keyframe `before`, agrees with `closure`, and with what has been seen
-  // since that one alone.
-  [[nodiscard]] bool Confirms(const Trail& trail, const PosePath& path, const LoopClosure& closure,
-                              std::size_t before) const;
+  // The first unconfirmed loop of an earlier search that agrees with `closure`.
+  [[nodiscard]] const LoopClosure* Earlier(const LoopClosure& closure, std::span<const KeyframeShape> shapes) const;
   // The closure with another keyframe of the same stretch as the recent one.
   [[nodiscard]] static LoopClosure SeenFrom(std::size_t keyframe, const LoopClosure& closure,
                                             std::span<const KeyframeShape> shapes);
@@ -98,8 +128,12 @@ class LoopSearch {
   LoopOptions options_;
   PointToLineOptions align_;
   double searched_at_m_ = 0.0;  // Where the last search began.
-  // What comparisons have found. If the last one was found where a search confirms, it is the loop to be closed.
+  // What comparisons have found. Where a confirmed loop is due to be closed, it is the last one.
   std::deque<LoopClosure> unconfirmed_;
+  std::uint32_t candidate_ = 0;  // The number of the one with which something is due.
+  Due due_ = Due::kNothing;
+  std::optional<Comparison> comparison_;
+  std::unique_ptr<StretchMatch> match_;  // Of the comparison; null after a restart.
 };
 
 }  // namespace cairn::slam

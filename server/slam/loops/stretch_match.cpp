@@ -50,32 +50,75 @@ SearchWindow WindowAround(const Pose2& T_ref_curr_guess, double way_m, const Loo
           std::min(kMaxDoubtRad, kDoubtRad + options.doubt_rad_per_m * way_m)};
 }
 
+StretchMatch::StretchMatch(const Trail& trail_ref, const Stretch& ref, const Trail& trail_curr, const Stretch& curr,
+                           const SearchWindow& window, double max_rival)
+    : ref_(ref),
+      curr_(curr),
+      recent_(SurfacesOf(trail_curr, curr, 2.0 * kSearchCellM)),
+      before_(SurfacesOf(trail_ref, ref, 0.5 * kSearchCellM)) {
+  if (std::min(recent_.size(), before_.size()) < kMinSurfaces) return;
+  pyramid_.emplace(before_, kSearchCellM, kLikelihoodReachM, kLevels);
+  search_.emplace(recent_, *pyramid_, window, max_rival);
+  step_ = Step::kSearch;
+}
+
+bool StretchMatch::GoOn(const Trail& trail_ref, const Trail& trail_curr, int blocks, const LoopOptions& options,
+                        const PointToLineOptions& align) {
+  step_ = Next(trail_ref, trail_curr, blocks, options, align);
+  return step_ == Step::kEnded;
+}
+
+StretchMatch::Step StretchMatch::Next(const Trail& trail_ref, const Trail& trail_curr, int blocks,
+                                      const LoopOptions& options, const PointToLineOptions& align) {
+  const double near_m = kNearShare * align.inlier_distance_m;
+  switch (step_) {
+    case Step::kSearch:
+      // For the best pose and for its rivals, which often takes few blocks each.
+      if (!search_->GoOn(blocks / 2) && !search_->GoOn(blocks / 2)) return Step::kSearch;
+      return search_->found() ? Step::kAlign : Step::kEnded;
+    case Step::kAlign:
+      return Align(align) && OursAgree(trail_ref, options, near_m) ? Step::kTheirs : Step::kEnded;
+    case Step::kTheirs:
+      if (TheirsAgree(trail_curr, options, near_m)) found_ = aligned_;
+      return Step::kEnded;
+    case Step::kEnded:
+      break;
+  }
+  return Step::kEnded;
+}
+
+bool StretchMatch::Align(const PointToLineOptions& align) {
+  before_index_.emplace(before_);
+  PointToLineOptions explaining = align;
+  explaining.min_score = kMinExplained;
+  const Pose2& unique = *search_->found();
+  const MatchResult aligned =
+      AlignPointsToSurfaces(recent_, *before_index_, {unique, unique, UniquePoseCovariance()}, explaining);
+  aligned_ = aligned.T_ref_curr;
+  return aligned.converged && !aligned.degenerate;
+}
+
+bool StretchMatch::OursAgree(const Trail& trail_ref, const LoopOptions& options, double near_m) const {
+  const FreeSpace before_free(trail_ref, ref_, options.free_cell_m);
+  const Agreement ours = AgreementOf(recent_, aligned_, *before_index_, before_free, near_m);
+  return ours.explained >= kMinExplained * static_cast<double>(recent_.size()) &&
+         ours.conflict() <= options.max_conflict;
+}
+
+bool StretchMatch::TheirsAgree(const Trail& trail_curr, const LoopOptions& options, double near_m) const {
+  const PointIndex recent_index(recent_);
+  const FreeSpace recent_free(trail_curr, curr_, options.free_cell_m);
+  const Agreement theirs = AgreementOf(before_, aligned_.Inverse(), recent_index, recent_free, near_m);
+  return theirs.conflict() <= options.max_conflict;
+}
+
 std::optional<Pose2> MatchStretches(const Trail& trail_ref, const Stretch& ref, const Trail& trail_curr,
                                     const Stretch& curr, const SearchWindow& window, const LoopOptions& options,
                                     const PointToLineOptions& align) {
-  const std::vector<SurfacePoint> recent = SurfacesOf(trail_curr, curr, 2.0 * kSearchCellM);
-  const std::vector<SurfacePoint> before = SurfacesOf(trail_ref, ref, 0.5 * kSearchCellM);
-  if (std::min(recent.size(), before.size()) < kMinSurfaces) return std::nullopt;
-
-  const LikelihoodPyramid pyramid(before, kSearchCellM, kLikelihoodReachM, kLevels);
-  const auto unique = FindUniquePose(recent, pyramid, window, options.max_rival);
-  if (!unique) return std::nullopt;
-  const PointIndex before_index(before);
-  PointToLineOptions explaining = align;
-  explaining.min_score = kMinExplained;
-  const MatchResult aligned =
-      AlignPointsToSurfaces(recent, before_index, {*unique, *unique, UniquePoseCovariance()}, explaining);
-  if (!aligned.converged || aligned.degenerate) return std::nullopt;
-  const double near_m = kNearShare * align.inlier_distance_m;
-  const FreeSpace before_free(trail_ref, ref, options.free_cell_m);
-  const Agreement ours = AgreementOf(recent, aligned.T_ref_curr, before_index, before_free, near_m);
-  if (ours.explained < kMinExplained * static_cast<double>(recent.size()) || ours.conflict() > options.max_conflict)
-    return std::nullopt;
-  const PointIndex recent_index(recent);
-  const FreeSpace recent_free(trail_curr, curr, options.free_cell_m);
-  const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
-  if (theirs.conflict() > options.max_conflict) return std::nullopt;
-  return aligned.T_ref_curr;
+  StretchMatch match(trail_ref, ref, trail_curr, curr, window, options.max_rival);
+  while (!match.GoOn(trail_ref, trail_curr, kMaxBlocks, options, align)) {
+  }
+  return match.found();
 }
 
 }  // namespace cairn::slam

@@ -72,7 +72,7 @@ inline constexpr char kKindOf = 0;
 
 // The version of what is written; it grows when the members of a class change. A reader is told which version it reads,
 // so that a class that has got a member later can leave it as it is.
-inline constexpr std::uint32_t kStateFormat = 14;
+inline constexpr std::uint32_t kStateFormat = 15;
 
 class StateWriter;
 

@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "server/slam/loops/one_per_cell.h"
+#include "server/slam/loops/stretch_match.h"
 #include "server/slam/state/archive.h"
 #include "tests/server/slam/ring_world.h"
 
@@ -61,6 +65,9 @@ std::optional<LoopClosure> DriveUntilFound(Drive& drive, const World& world, dou
     way_m += step.x;
     if (way_m < from_m) continue;
     if (const auto loop = search.Find(drive.trail, drive.believed)) return loop;
+    // Other scans follow on each keyframe, enough for a comparison.
+    while (search.busy())
+      if (const auto loop = search.GoOn(drive.trail)) return loop;
   }
   return std::nullopt;
 }
@@ -162,59 +169,129 @@ TEST(LoopSearch, TheSameScansDoNotConfirmALoop) {
   }
 }
 
-// A search is done in parts, one with each keyframe. A restart between any two of them changes nothing.
+std::string StateOf(const LoopSearch& search) {
+  StateWriter writer;
+  writer(search);
+  return writer.Bytes();
+}
+
+// A search is done in parts, one with each scan. A restart before any of them changes nothing, also in the middle of a
+// comparison.
 TEST(LoopSearch, GoesOnAfterARestart) {
   const World world = RingCorridor(true, 11);
-  LoopSearch search({}, {});
+  auto search = std::make_unique<LoopSearch>(LoopOptions{}, PointToLineOptions{});
   Drive drive;
   std::mt19937_64 rng(1);
-  std::vector<std::string> states;  // After each keyframe.
   std::optional<LoopClosure> found;
+  int restarts_in_comparisons = 0;
   double way_m = 0.0;
   for (const Pose2& step : RingSteps(150.0, 0.4)) {
     drive.Step(world, step, 0.0015 * step.x, rng);
     way_m += step.x;
-    if (way_m > 112.0) {
-      // What a part finds is kept, and the part that gives the loop is another one than that which confirms it.
-      LoopSearch restored({}, {});
-      if (!states.empty()) {
-        StateReader reader(states.back());
-        reader.SetKeyframes(drive.trail.size() - 1);
-        reader(restored);
-        ASSERT_TRUE(reader.done());
-      }
-      const auto again = restored.Find(drive.trail, drive.believed);
-      found = search.Find(drive.trail, drive.believed);
+    for (const bool keyframe : {true, false}) {  // Each keyframe is followed by another scan.
+      if (way_m < 112.0 || found) continue;
+      auto restored = std::make_unique<LoopSearch>(LoopOptions{}, PointToLineOptions{});
+      const std::string state = StateOf(*search);
+      StateReader reader(state);
+      reader.SetKeyframes(drive.trail.size());
+      reader(*restored);
+      ASSERT_TRUE(reader.done());
+      restarts_in_comparisons += search->busy() ? 1 : 0;
+      const auto scan = [&](LoopSearch& of) {
+        return keyframe ? of.Find(drive.trail, drive.believed) : of.GoOn(drive.trail);
+      };
+      found = scan(*search);
+      const auto again = scan(*restored);
       ASSERT_EQ(again.has_value(), found.has_value()) << drive.trail.size();
-      if (found) {
-        EXPECT_EQ(again->T_old_recent, found->T_old_recent);
-        EXPECT_EQ(again->old, found->old);
-        EXPECT_EQ(found->recent, drive.trail.size() - 1);
-        break;
-      }
-      StateWriter writer;
-      writer(search);
-      states.push_back(writer.Bytes());
+      ASSERT_EQ(StateOf(*search), StateOf(*restored)) << drive.trail.size();
+      if (!found) continue;
+      EXPECT_EQ(again->T_old_recent, found->T_old_recent);
+      EXPECT_EQ(again->old, found->old);
+      EXPECT_EQ(found->recent, drive.trail.size() - 1);
     }
+    if (found) break;
   }
   ASSERT_TRUE(found);
   ExpectRight(drive, *found);
+  EXPECT_GT(restarts_in_comparisons, 10);
 }
 
-TEST(LoopSearch, WhatWasFoundBeforeTheRobotWasLostClosesNoLoop) {
+// What a comparison finds does not depend on how it is cut, and a smaller part does less.
+TEST(StretchMatch, FindsTheSameInParts) {
+  const Ride& ride = kRides[0];
+  Drive drive;
+  DriveUntilFound(drive, RingCorridor(true, 11), 132.0, ride, 1e9);
+  const std::span<const KeyframeShape> shapes = drive.trail.shapes();
+  const std::size_t now = shapes.size() - 1;
+  const Stretch recent = StretchAround(shapes, now, kStretchM);
+  const auto old_end =
+      std::ranges::upper_bound(shapes, shapes[now].travelled_m - 112.0, {}, &KeyframeShape::travelled_m);
+  const Stretch old =
+      StretchAround(shapes.first(recent.first), static_cast<std::size_t>(old_end - shapes.begin()), kStretchM);
+  const LoopOptions options;
+  const SearchWindow window = WindowAround(Between(drive.believed[old.anchor], drive.believed[now]), 112.0, options);
+  const auto whole = MatchStretches(drive.trail, old, drive.trail, recent, window, options, {});
+  ASSERT_TRUE(whole);
+  int fewer = 0;
+  for (const int blocks : {1'000'000, 1'000, 200}) {
+    StretchMatch match(drive.trail, old, drive.trail, recent, window, options.max_rival);
+    int parts = 1;
+    while (!match.GoOn(drive.trail, drive.trail, blocks, options, {})) ++parts;
+    ASSERT_TRUE(match.found());
+    EXPECT_EQ(*match.found(), *whole) << blocks;
+    EXPECT_GT(parts, fewer) << blocks;
+    fewer = parts;
+  }
+}
+
+// Drives until a loop is closed, and forgets with keyframe `lost_at`. Returns the number of the last keyframe.
+std::size_t ClosedAt(std::size_t lost_at) {
   const World world = RingCorridor(true, 11);
   LoopSearch search({}, {});
   Drive drive;
   std::mt19937_64 rng(1);
-  double way_m = 0.0, found_at_m = 0.0;
+  double way_m = 0.0;
   for (const Pose2& step : RingSteps(150.0, 0.4)) {
     drive.Step(world, step, 0.0015 * step.x, rng);
     way_m += step.x;
     if (way_m < 112.0) continue;
-    search.ForgetUnconfirmed();  // Again and again.
-    if (search.Find(drive.trail, drive.believed)) found_at_m = way_m;
+    if (drive.trail.size() == lost_at) search.ForgetUnconfirmed();
+    bool closed = search.Find(drive.trail, drive.believed).has_value();
+    while (search.busy() && !closed) closed = search.GoOn(drive.trail).has_value();
+    if (closed) return drive.trail.size();
   }
-  EXPECT_EQ(found_at_m, 0.0);
+  return 0;
+}
+
+TEST(LoopSearch, WhatWasFoundBeforeTheRobotWasLostClosesNoLoop) {
+  const std::size_t otherwise = ClosedAt(0);
+  ASSERT_GT(otherwise, 0U);
+  // Without what it has found before, it needs 1.5 m from one comparison to the next.
+  EXPECT_GE(ClosedAt(otherwise - 2), otherwise + 4);
+}
+
+// Its stretches are no longer what they were when it began.
+TEST(LoopSearch, WhatIsBeingComparedIsForgottenWhereKeyframesAreRetired) {
+  const World world = RingCorridor(true, 11);
+  LoopSearch search({}, {});
+  Drive drive;
+  std::mt19937_64 rng(1);
+  double way_m = 0.0;
+  for (const Pose2& step : RingSteps(150.0, 0.4)) {
+    drive.Step(world, step, 0.0015 * step.x, rng);
+    way_m += step.x;
+    if (way_m < 112.0) continue;
+    ASSERT_FALSE(search.Find(drive.trail, drive.believed));
+    if (search.busy()) break;
+  }
+  ASSERT_TRUE(search.busy());
+  Retirement none;
+  for (std::size_t k = 0; k < drive.trail.size(); ++k) {
+    none.representative.push_back(k);
+    none.index_after.push_back(k);
+  }
+  search.Retire(none);
+  EXPECT_FALSE(search.busy());
 }
 
 TEST(OnePerCell, TakesTheFirstPointOfEachCell) {
