@@ -74,10 +74,12 @@ void AddRobot(CLI::App& app, Program& program) {
   auto* relocalise = robot->add_subcommand("relocalise", "Have a robot found again that is not where its pose says");
   relocalise->footer(
       "From now on the robot is not localized, and nothing is drawn of it, until what it sees agrees with the map.\n"
-      "With --here one scan can be enough; it is looked for near that pose (slam.recovery.near_m, near_rad).\n"
-      "Otherwise it looks for itself in its own map, and has to drive until two searches agree; and a job looks for\n"
-      "it in the whole map of its site and ranks all places where it may be. If the best one has no rival, the\n"
-      "robot's next scans have to confirm it; otherwise nothing is changed, and --here decides.\n"
+      "With --here one scan can be enough, where its own map shows the place; it is looked for near that pose\n"
+      "(slam.recovery.near_m, near_rad). Otherwise it looks for itself in its own map, and has to drive until two\n"
+      "searches agree. In both cases a job looks for it in the map of its site: near that pose first, otherwise\n"
+      "everywhere, and ranks all places where it may be. If it sees what the map shows near that pose, or if the best\n"
+      "place has no rival, the robot's next scans have to confirm it; otherwise nothing is changed, and --here "
+      "decides.\n"
       "A robot that is not joined with the map of its site is joined by --here, if what it has seen agrees with the\n"
       "map there. The exit code says whether the job succeeded; interrupting only stops the waiting.\n"
       "EXAMPLES\n  cairn robot relocalise robot1 --here 12.5,-3,90deg\n  cairn robot relocalise robot1");

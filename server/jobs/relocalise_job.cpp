@@ -105,10 +105,18 @@ void PublishNow(Site& site) {
 
 Result<LookedFor> LookForRobot(const std::string& robot, std::span<const slam::RecentScan> scans,
                                const slam::SearchedMap& map, const slam::SiteOptions& options,
-                               const JobControl& control) {
+                               const JobControl& control, const std::optional<Pose2>& T_map_said) {
   if (scans.empty())
     return Fail(StatusCode::kFailedPrecondition, robot + " has sent no scan by which it could be looked for");
   slam::PlaceSearch search(options.place, options.loop, options.self_check, options.align);
+  if (T_map_said) {
+    if (const auto near = search.FindNear(map, scans, *T_map_said)) {
+      LookedFor looked{.outcome = {.message = robot + " was found where somebody said: " + TextOf(near->T_map_robot)},
+                       .found = near};
+      looked.outcome.places = {{scans.back().scan->stamp, near->T_map_robot, 1.0}};
+      return looked;
+    }
+  }
   std::size_t searches = 0;
   const auto go_on = [&] {
     const double share = static_cast<double>(searches++) / static_cast<double>(kMostHypotheses + 1);
@@ -143,7 +151,9 @@ Result<JobOutcome> RelocaliseJob::Run(const Job& job, const JobControl& control)
   if (!material->lost.lost && !fragment)
     return JobOutcome{.message = job.robot + " is not lost any more: nothing was changed"};
   const auto scans = material->lost.lost ? material->lost.scans : LastScans(material->snapshot, site_);
-  auto looked = LookForRobot(job.robot, scans, *map->grid, site_, control);
+  // A fragment has a frame of its own.
+  const auto T_map_said = fragment ? std::nullopt : material->lost.T_map_said;
+  auto looked = LookForRobot(job.robot, scans, *map->grid, site_, control, T_map_said);
   if (!looked) return tl::unexpected(looked.error());
   PlaceFound found{.place = std::nullopt, .places = looked->outcome.places};
   if (looked->found) {

@@ -2,10 +2,10 @@
 // and earlier sessions have drawn. The last scans of the robot are compared with all of the map (slam/recovery,
 // PlaceSearch::Rank): branch and bound, with a bound on its work. All places that may be its own are ranked. If one has
 // no rival, the robot is told, and its next scans have to confirm it (slam::Recovery::Suggest); otherwise nothing is
-// changed. A robot that is not joined with the map of its site, and of which somebody says where it is, is joined there
-// if what it has seen agrees with the map; if it does not, nothing is changed.
-// Thread rule: runs on the job worker's threads. It waits for the session, and for the site, at most
-// jobs.snapshot_timeout_s each.
+// changed. Where somebody has said where a robot is that is lost, it is looked for there first, and a rival elsewhere
+// does not count. A robot that is not joined with the map of its site, and of which somebody says where it is, is
+// joined there if what it has seen agrees with the map; if it does not, nothing is changed. Thread rule: runs on the
+// job worker's threads. It waits for the session, and for the site, at most jobs.snapshot_timeout_s each.
 #pragma once
 
 #include <memory>
@@ -31,10 +31,13 @@ struct LookedFor {
 };
 
 // A pure function: the same scans and the same map give the same result. `scans`: the last ones of the robot, in the
-// order of time. FAILED_PRECONDITION: there are no scans. CANCELLED: the job was cancelled.
+// order of time. `T_map_said`: where somebody says that the robot was at the last of them. If what it sees agrees with
+// the map there, that place is the only one, whatever looks like it elsewhere. FAILED_PRECONDITION: there are no scans.
+// CANCELLED: the job was cancelled.
 [[nodiscard]] Result<LookedFor> LookForRobot(const std::string& robot, std::span<const slam::RecentScan> scans,
                                              const slam::SearchedMap& map, const slam::SiteOptions& options,
-                                             const JobControl& control);
+                                             const JobControl& control,
+                                             const std::optional<Pose2>& T_map_said = std::nullopt);
 
 class RelocaliseJob {
  public:

@@ -230,11 +230,11 @@ Reply Desk::StatusReply(const Request& request) {
   return reply;
 }
 
-// Where somebody says where the robot is, its session looks at that place with the next scan. Otherwise a job looks for
-// it in the whole map of its site, from when the session knows that it is lost. Of one that is lost already, what it
-// has seen since counts. Where no job can be submitted, the session is not told either, because then the robot would be
-// lost without being looked for. A job also joins a robot that is not joined with the map of its site at the place
-// given.
+// Where somebody says where the robot is, its session looks at that place in its own map with the next scan. In both
+// cases a job looks for it in the map of its site, from when the session knows that it is lost: near the place given
+// first, which others may have mapped. Of one that is lost already, what it has seen since counts. Where no job can be
+// submitted and no place was given, the session is not told either, because then the robot would be lost without being
+// looked for. A job also joins a robot that is not joined with the map of its site at the place given.
 std::optional<Answer> Desk::Relocalise(const Request& request) {
   const auto session = roster_.FindOrFail(request.robot);
   if (!session) return ReplyTo(request, session.error());
@@ -257,15 +257,18 @@ std::optional<Answer> Desk::Relocalise(const Request& request) {
   const auto order = [&](const auto& receipt) {
     return roster_.Relocalise(request.robot, request.T_map_robot, receipt);
   };
-  if (request.T_map_robot) return Order(request, order);
-  if (const auto room = worker_.CheckRoomToLook(); !room) return ReplyTo(request, room.error());
-  return Order(request, order, [&worker = worker_, site, robot = request.robot, id](Reply& reply) {
+  const bool said = request.T_map_robot.has_value();
+  const auto room = worker_.CheckRoomToLook();
+  if (!room && !said) return ReplyTo(request, room.error());
+  // One that is only localised looks for itself in the map of its site.
+  if (said && (!room || record.localises())) return Order(request, order);
+  return Order(request, order, [&worker = worker_, site, robot = request.robot, id, said](Reply& reply) {
     auto job = worker.Submit(site, JobKind::kRelocalise, true, id, {robot});
     if (job) {
       reply.jobs = {*std::move(job)};
     } else {  // Others have taken the room meanwhile. The robot looks for itself in its own map.
       spdlog::warn("robot {}: no job looks for it: {}", robot, job.error().message);
-      reply.status = job.error();
+      if (!said) reply.status = job.error();
     }
   });
 }

@@ -161,6 +161,8 @@ class Mapper {
     bool lost = false;
     bool since_lost = false;  // The scans are those since it was lost.
     std::vector<RecentScan> scans;
+    // Where somebody says that the robot is, carried by odometry to the last of the scans (Relocalise).
+    std::optional<Pose2> T_map_said{};
   };
   [[nodiscard]] LostView SeenWhileLost() const;
   // A search in another map has found the robot: it was at `T_map_robot` when it saw the scan of this stamp. Its next

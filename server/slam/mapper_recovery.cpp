@@ -137,6 +137,10 @@ Mapper::LostView Mapper::SeenWhileLost() const {
   const bool only_doubted = recovery.doubt() && !recovery.was_carried();
   LostView view{recovery.active() && !only_doubted, recovery.has_scans(), recovery.recent()};
   if (!view.lost) return {};
+  if (recovery.was_said() && s.last_scan) {
+    view.T_map_said =
+        recovery.BeliefAt(s.OdometryOrNone(s.last_scan->T_odom_robot), s.last_scan->T_track_robot).T_map_robot;
+  }
   if (!view.since_lost && s.last_scan) {
     view.scans = {{s.last_scan->scan, s.last_scan->T_track_robot, 0.0,
                    Look(*s.last_scan->scan, s.options.front_end).points_robot}};

@@ -146,6 +146,30 @@ TEST(FoundElsewhere, ARobotThatWasCarriedToThePartOfAnotherIsFoundThereAndAResta
   EXPECT_TRUE(SamePath(PathOf(second.house()), path));
 }
 
+// Its own map does not show the place.
+TEST(FoundElsewhere, ARobotThatWasCarriedToThePartOfAnotherIsFoundWhereSomebodySays) {
+  WholeServer house(Options());
+  Carried first("r1", kDriver, 0.0), second("r2", kSecond, 44.0);
+  first.Open(house, true);
+  first.Drive(house, 16.0);
+  second.Open(house, true);
+  second.Drive(house, 40.0);
+  ASSERT_NO_FATAL_FAILURE(WaitPublished(house, second.T_ring_robot()));
+
+  first.PutAt(52.0);
+  const Reply told = Relocalise(house, "r1", first.T_ring_robot() * Pose2{0.4, -0.2, 0.1});
+  ASSERT_TRUE(told.status.ok()) << told.status.message;
+  ASSERT_EQ(told.jobs.size(), 1U);
+  first.Drive(house, 2.0);
+  const Job job = house.WaitJob(told.jobs[0].id);
+  EXPECT_EQ(job.state, JobState::kSucceeded) << job.message;
+  EXPECT_THAT(job.message, HasSubstr("where somebody said"));
+  EXPECT_THAT(job.message, HasSubstr("have to confirm"));
+  first.Drive(house, 4.0);
+  EXPECT_TRUE(first.LastPose(house).localized) << PoseReasonName(first.LastPose(house).reason);
+  EXPECT_LT(first.ErrorM(house), 0.5);
+}
+
 TEST(FoundElsewhere, ARobotThatIsNotJoinedIsJoinedWhereSomebodySaysAndOnlyIfThatIsRight) {
   WholeServer house(Options());
   Carried first("r1", kDriver, 0.0), second("r2", kSecond, 20.0);

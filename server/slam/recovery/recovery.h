@@ -94,6 +94,8 @@ class Recovery {
   void BeginNear(const Known& known, const Pose2& T_map_track);
   // The next scans continue the path: `T_map_track` is its pose in the map.
   void BeginOnPath(const Known& known, const Pose2& T_map_track);
+  // Whether it is looked for where somebody says that it is, and not where it has been followed to.
+  [[nodiscard]] bool was_said() const { return active_ && said_ && !on_path(); }
   [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
   // The map has moved by this where the robot was last.
   void Move(const Pose2& T_new_old);

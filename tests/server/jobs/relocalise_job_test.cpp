@@ -89,6 +89,27 @@ TEST_F(LookForRobotTest, WhereRoomsAreAlikeThePlacesAreRankedAndNoneIsFound) {
   EXPECT_THAT(looked->outcome.message, HasSubstr("--here"));
 }
 
+TEST_F(LookForRobotTest, WhereRoomsAreAlikeThatWhichSomebodyHasSaidIsFound) {
+  const World world = slam::test::RingOfEqualRooms();
+  const RobotDrive drive = DriveRing(world, 16.0, 5.0, {}, 2);
+  const auto map = MapOf(world, 0.0, 36.0);
+  const Pose2& T_map_robot = drive.truth.back();
+  const auto look = [&](const Pose2& T_map_said) {
+    return LookForRobot("r1", ScansOf(drive), *map, kOptions, control_, T_map_said);
+  };
+  const auto looked = look(T_map_robot * Pose2{0.3, -0.2, 0.1});
+  ASSERT_TRUE(looked) << looked.error().message;
+  ASSERT_TRUE(looked->found) << looked->outcome.message;
+  EXPECT_LT((looked->found->T_map_robot.translation() - T_map_robot.translation()).norm(), 0.3);
+  ASSERT_EQ(looked->outcome.places.size(), 1U);
+  EXPECT_THAT(looked->outcome.message, HasSubstr("where somebody said"));
+  // What it sees contradicts the place: that is as if nobody had said anything.
+  const auto wrong = look(T_map_robot * Pose2{0.0, 0.0, kPi / 2});
+  ASSERT_TRUE(wrong) << wrong.error().message;
+  EXPECT_FALSE(wrong->found);
+  EXPECT_GE(wrong->outcome.places.size(), 2U);
+}
+
 TEST_F(LookForRobotTest, APlaceThatTheMapDoesNotShowIsNotFound) {
   const World world = slam::test::RingCorridor(true);
   const auto looked = LookFor(DriveRing(world, 60.0, 12.0, {}, 2), *MapOf(world, 0.0, 24.0));

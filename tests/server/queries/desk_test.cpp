@@ -219,6 +219,12 @@ TEST_F(DeskTest, ARobotIsNotLookedForWhereNoJobCanBeSubmitted) {
   EXPECT_FALSE(roster_.Find("r1")->has_work()) << "the robot was told that it is lost";
   EXPECT_EQ(relocalised.status.message, "too many jobs are waiting (jobs.max_queued); try again later");
   EXPECT_TRUE(Ask(Of(RequestKind::kJobSubmit)).status.ok()) << "those that change maps wait elsewhere";
+  // Where somebody says where it is, it looks there for itself.
+  Request here = Of(RequestKind::kRelocalise);
+  here.T_map_robot = Pose2{};
+  const std::size_t before = jobs_.OfSite({}).size();
+  EXPECT_TRUE(Ask(here).status.ok());
+  EXPECT_EQ(jobs_.OfSite({}).size(), before);
 }
 
 // A server that was killed after its answer had forgotten the order when it started again.
