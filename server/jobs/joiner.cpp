@@ -51,8 +51,12 @@ std::map<std::string, Joiner::Driven> Joiner::Look() const {
   std::map<std::string, Driven> sites;
   for (const auto& session : roster_.All()) {
     const SessionRecord::Joining joining = session->record().joining();
-    Driven& driven = sites[session->record().state().site];
-    if (joining.fragment && joining.joinable) driven.fragments.emplace(session->id(), joining.driven_m);
+    const std::string name = session->record().state().site;
+    Driven& driven = sites[name];
+    if (!joining.fragment || !joining.joinable) continue;
+    const auto site = atlas_.Find(name);
+    if (site == nullptr || !site->kept_apart().contains(session->id()))
+      driven.fragments.emplace(session->id(), joining.driven_m);
   }
   for (auto& [site, driven] : sites) {
     for (const auto& session : roster_.InSite(site)) {  // Earlier ones too.

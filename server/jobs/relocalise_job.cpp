@@ -286,7 +286,7 @@ Result<JobOutcome> RelocaliseJob::JoinWhereSaid(const Job& job, const SessionMat
   if (!number) return tl::unexpected(number.error());
   outcome.map_version = *number;
   const auto enabled = smooth_.Await(job.site, control, [&](Site& to, Site::Done done, Site::Wanted wanted) {
-    to.Enable(*number, std::move(done), std::move(wanted));
+    to.Enable(*number, std::move(done), std::move(wanted), Site::EnabledBy::kSaid);
   });
   if (!enabled) return tl::unexpected(enabled.error());
   return outcome;

@@ -220,6 +220,17 @@ bool SmoothJob::MayAlign(const Job& job) const {
   });
 }
 
+std::set<SessionId> SmoothJob::KeptApart(const std::string& name) const {
+  const auto site = atlas_.Find(name);
+  return site == nullptr ? std::set<SessionId>{} : site->kept_apart();
+}
+
+bool SmoothJob::JoinsKeptApart(const Job& job, const MapVersion& version) const {
+  return std::ranges::any_of(version.parts, [apart = KeptApart(job.site)](const auto& part) {
+    return !part.second.fragment && apart.contains(part.first);
+  });
+}
+
 Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<SessionMaterial>& material,
                                        const JobControl& control) {
   std::vector<std::uint64_t> sessions;
@@ -238,13 +249,19 @@ Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<Session
 }
 
 Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) {
-  const auto material = Collect(job.site, control);
+  auto material = Collect(job.site, control);
   if (!material) return tl::unexpected(material.error());
+  if (job.kind == JobKind::kJoin) {
+    std::erase_if(*material, [apart = KeptApart(job.site)](const SessionMaterial& one) {
+      return !one.start_known && apart.contains(one.session);
+    });
+  }
   auto smoothed = Smooth(job, *material, control);
   if (!smoothed) return tl::unexpected(smoothed.error());
   JobOutcome outcome = std::move(smoothed->outcome);
   if (!smoothed->version) return outcome;
-  if (smoothed->aligns && !MayAlign(job)) {  // It took long; a person may have come meanwhile.
+  // It took long; a person may have come meanwhile.
+  if ((smoothed->aligns && !MayAlign(job)) || (job.kind == JobKind::kJoin && JoinsKeptApart(job, *smoothed->version))) {
     outcome.message = "given up for the sake of a person's wish: " + outcome.message;
     return outcome;
   }
@@ -254,7 +271,8 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
   if (!number) return tl::unexpected(number.error());
   outcome.map_version = *number;
   if (!enable || control.cancelled()) return outcome;
-  const auto by = smoothed->aligns ? Site::EnabledBy::kAlignment : Site::EnabledBy::kJob;
+  const auto joins = job.kind == JobKind::kJoin ? Site::EnabledBy::kJoin : Site::EnabledBy::kJob;
+  const auto by = smoothed->aligns ? Site::EnabledBy::kAlignment : joins;
   const auto enable_it = [version = *number, by](Site& site, Site::Done done, Site::Wanted wanted) {
     site.Enable(version, std::move(done), std::move(wanted), by);
   };

@@ -6,7 +6,8 @@
 // whose place is known stays a fragment in the new version (maps/robot_grid.h). A job of the kind kJoin makes no
 // version unless it joins a fragment, fits robots that said where they start better to each other (alignment.h), or
 // finds that one was joined at a wrong place (both only where no person has chosen the enabled version, and no other
-// job of the site waits that may change its map). Source: thesis A 5.4 (full-SLAM path of the best particle). Thread
+// job of the site waits that may change its map); and it joins no robot that a person has taken out of the map
+// (Site::kept_apart). Source: thesis A 5.4 (full-SLAM path of the best particle). Thread
 // rule: runs on one thread of the job worker. It waits for the sessions and for the site, at most
 // jobs.snapshot_timeout_s each, and for a switch of versions that has begun until it is complete; no other thread waits
 // for it.
@@ -16,6 +17,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -67,6 +69,9 @@ class SmoothJob {
  private:
   // Whether the job may make a version that nobody has asked for.
   [[nodiscard]] bool MayAlign(const Job& job) const;
+  // Sessions of the site that a person has taken out of its map (Site::kept_apart).
+  [[nodiscard]] std::set<SessionId> KeptApart(const std::string& site) const;
+  [[nodiscard]] bool JoinsKeptApart(const Job& job, const MapVersion& version) const;
   Result<SmoothedSite> Smooth(const Job& job, const std::vector<SessionMaterial>& material, const JobControl& control);
   Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
 

@@ -165,7 +165,7 @@ void Site::Enable(std::uint32_t version, Done done, Wanted wanted, EnabledBy by)
       return done(Fail(StatusCode::kUnavailable, "another map version is being enabled; try again later"));
     }
     try {
-      site.Begin(version, std::move(done), by == EnabledBy::kPerson);
+      site.Begin(version, std::move(done), by);
     } catch (...) {
       site.switch_.reset();  // Otherwise no other switch could ever begin.
       throw;
@@ -202,6 +202,10 @@ void Site::End(SessionId session) {
 void Site::Leave(SessionId session) {
   Run([session](Site& site) {
     site.StoreTogether([&] {
+      {
+        const MutexLock lock(site.mutex_);
+        site.kept_apart_.erase(session);
+      }
       site.KeepAsLayer(session);
       site.together_->forgotten.push_back(session);
     });

@@ -44,10 +44,15 @@
 
 namespace cairn::server {
 
+// Who wants a map version: a person who has chosen it, a job that a person has asked for, a person who has said where a
+// robot is, a job that joins robots by itself, or one that fits robots to each other by itself. The last two must not
+// undo what a person has chosen.
+enum class EnabledBy : std::uint8_t { kPerson, kJob, kSaid, kJoin, kAlignment };
+
 // A version switch under way. It is complete when no session is awaited.
 struct VersionSwitch {
   std::uint32_t version = 0;
-  bool chosen = false;  // By a person.
+  EnabledBy by = EnabledBy::kPerson;
   std::set<SessionId> awaited;
   std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered,
   DrawnPaths drawn;                                         // and where their keyframes lie in these.
@@ -134,15 +139,21 @@ class Site : public std::enable_shared_from_this<Site> {
   void Close(std::function<void()> done);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
-  // Who wants a version: a person who has chosen it, a job that a person has asked for or that joins a robot, or a job
-  // that fits robots to each other by itself. The last one must not undo what a person has chosen.
-  enum class EnabledBy : std::uint8_t { kPerson, kJob, kAlignment };
+  using EnabledBy = server::EnabledBy;
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
-  // FAILED_PRECONDITION: kAlignment, and a person has chosen the enabled version.
+  // FAILED_PRECONDITION: kAlignment, and a person has chosen the enabled version; or kJoin or kAlignment, and the
+  // version joins a session that is kept apart.
   void Enable(std::uint32_t version, Done done, Wanted wanted = {}, EnabledBy by = EnabledBy::kPerson);
   // Whether a job may enable a version without being asked: no person has chosen the enabled one, and there is no newer
   // one about which a person has not decided. Thread rule: any thread.
   [[nodiscard]] bool MayBeAligned() const;
+  // Sessions that a person has taken out of the map, by enabling a version in which they are fragments. No job joins
+  // them by itself, until a person enables a version in which they are joined, or a job that a person has asked for
+  // joins them. Thread rule: any thread.
+  [[nodiscard]] std::set<SessionId> kept_apart() const {
+    const MutexLock lock(mutex_);
+    return kept_apart_;
+  }
   // What a person says about the map (common/map/map_edit.h); `done` receives the edit's number, on the strand.
   // FAILED_PRECONDITION: nothing is drawn yet, or not near it. NOT_FOUND: the site is deleted. Else errors of
   // MapEdits::Add.
@@ -202,7 +213,8 @@ class Site : public std::enable_shared_from_this<Site> {
   void LogFailure(const std::exception& error) const;
   // The functions below run on the strand only.
   void Apply(SessionId session, const Drawing& drawing);
-  void Begin(std::uint32_t version, Done done, bool chosen);
+  void Begin(std::uint32_t version, Done done, EnabledBy by);
+  void KeepApart(const VersionSwitch& complete);
   void FailSwitch(StatusCode code, const std::string& why);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
   std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
@@ -299,6 +311,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.
   mutable Mutex mutex_;
   std::shared_ptr<const MapSnapshot> snapshot_ CAIRN_GUARDED_BY(mutex_);
+  std::set<SessionId> kept_apart_ CAIRN_GUARDED_BY(mutex_);    // Written on the strand only.
   std::shared_ptr<Changes> waiting_ CAIRN_GUARDED_BY(mutex_);  // To be added to, until the strand takes them.
   std::atomic<bool> publish_waits_ = false;
 };

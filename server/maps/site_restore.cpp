@@ -80,7 +80,8 @@ void Site::StoreSite() {
                     .edits_version = edits_.version(),
                     .anchors = edits_.anchors(),
                     .given_up = memory_.given_up(),
-                    .chosen = chosen_};
+                    .chosen = chosen_,
+                    .kept_apart = kept_apart()};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
@@ -122,6 +123,10 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   merged_ = stored.merged;
   memory_.Restore(stored.given_up);
   chosen_ = stored.chosen;
+  {
+    const MutexLock lock(mutex_);
+    kept_apart_ = stored.kept_apart;
+  }
   const std::size_t left_out = edits_.Restore(
       stored.edits, stored.edits_version, [&control] { control.Advance(); }, stored.anchors);
   if (left_out > 0) spdlog::error("site {}: {} edits of its map cover too much and are left out", name_, left_out);

@@ -1,6 +1,8 @@
 // How a site switches to another map version, and gives a session the part of it that it has missed (site.h).
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,20 +36,26 @@ class Site::Ticket {
   bool used_ = false;
 };
 
-void Site::Begin(std::uint32_t version, Done done, bool chosen) {
+void Site::Begin(std::uint32_t version, Done done, EnabledBy by) {
   const MapVersion* const wanted = versions_.Find(version);
   if (wanted == nullptr) {
     return done(Fail(StatusCode::kNotFound, "site '" + name_ + "' has no map version " + std::to_string(version)));
   }
+  if (by == EnabledBy::kJoin || by == EnabledBy::kAlignment) {
+    const std::set<SessionId> apart = kept_apart();
+    if (std::ranges::any_of(wanted->parts,
+                            [&apart](const auto& part) { return !part.second.fragment && apart.contains(part.first); }))
+      return done(Fail(StatusCode::kFailedPrecondition, "a person has taken a robot of the version out of the map"));
+  }
   if (version == versions_.enabled()) {
-    chosen_ = chosen_ || chosen;
+    chosen_ = chosen_ || by == EnabledBy::kPerson;
     StoreSite();
     Refresh({}, {}, false);  // The notes of the versions say so.
     return done(version);
   }
   switch_.emplace();
   switch_->version = version;
-  switch_->chosen = chosen;
+  switch_->by = by;
   switch_->done = std::move(done);
   for (const auto& [session, part] : wanted->parts) {
     switch_->awaited.insert(session);
@@ -89,6 +97,7 @@ void Site::CommitIfComplete() {
   VersionSwitch complete = std::move(*switch_);
   switch_.reset();
   StoreTogether([&] {
+    KeepApart(complete);
     for (const auto& [session, chunks] : complete.staged) {
       joint_.Replace(session, chunks);
       joint_.SetHidden(session, complete.apart.contains(session));
@@ -102,7 +111,8 @@ void Site::CommitIfComplete() {
     for (const auto& [session, chunks] : complete.staged)
       if (layers_.contains(session)) StoreLayer(session);
     const std::vector<std::uint32_t> changed = versions_.Enable(complete.version, complete.displaced);
-    chosen_ = complete.chosen;
+    // A robot that is joined changes nothing of what a person has chosen.
+    chosen_ = complete.by == EnabledBy::kPerson || (chosen_ && complete.by != EnabledBy::kJob);
     switches_[++epoch_] = generation_;
     while (switches_.size() > kMostSwitches) switches_.erase(switches_.begin());
     for (const std::uint32_t version : changed) StoreVersion(version);
@@ -116,6 +126,18 @@ void Site::CommitIfComplete() {
   }
   Send();
   complete.done(complete.version);
+}
+
+// One that was a fragment before, too, is none that the person has taken out.
+void Site::KeepApart(const VersionSwitch& complete) {
+  const MutexLock lock(mutex_);
+  for (const auto& [session, chunks] : complete.staged) {
+    if (!complete.apart.contains(session)) {
+      kept_apart_.erase(session);
+    } else if (complete.by == EnabledBy::kPerson && !joint_.hidden().contains(session)) {
+      kept_apart_.insert(session);
+    }
+  }
 }
 
 void Site::FailSwitch(StatusCode code, const std::string& why) {

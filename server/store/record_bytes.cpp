@@ -190,6 +190,7 @@ std::string BytesOf(const StoredSite& site) {
     to.mutable_given_up()->set_sessions(site.given_up.sessions);
   }
   to.set_chosen(site.chosen);
+  for (const std::uint64_t session : site.kept_apart) to.add_kept_apart(session);
   return to.SerializeAsString();
 }
 
@@ -214,7 +215,8 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .given_up = {.versions = from.given_up().versions(),
                                .layers = from.given_up().layers(),
                                .sessions = from.given_up().sessions()},
-                  .chosen = from.chosen()};
+                  .chosen = from.chosen(),
+                  .kept_apart = {from.kept_apart().begin(), from.kept_apart().end()}};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();

@@ -183,7 +183,8 @@ struct StoredSite {
   // By the number of the edit. An edit without an entry hangs on no keyframe.
   std::map<std::uint64_t, EditAnchors> anchors{};
   GivenUp given_up{};
-  bool chosen = false;  // A person has chosen the enabled version.
+  bool chosen = false;                   // A person has chosen the enabled version.
+  std::set<std::uint64_t> kept_apart{};  // Fragments that a person has taken out of the map.
 };
 
 struct StoredLayer {

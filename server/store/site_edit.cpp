@@ -69,6 +69,8 @@ Result<Division> Divide(Store& store, SiteContents contents, const std::vector<s
       TakeOut(stays.members, [&](const auto& member) { return division.going.contains(member.second); });
   division.going_site.fragments =
       TakeOut(stays.fragments, [&](std::uint64_t fragment) { return division.going.contains(fragment); });
+  division.going_site.kept_apart =
+      TakeOut(stays.kept_apart, [&](std::uint64_t fragment) { return division.going.contains(fragment); });
   division.going_site.merged =
       TakeOut(stays.merged, [&](std::uint64_t layer) { return division.going.contains(layer); });
   const auto goes = [&](std::uint64_t session) { return division.going.contains(session); };

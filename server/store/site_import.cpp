@@ -102,12 +102,11 @@ class Renaming {
     std::map<NameId, std::uint64_t> members;
     for (const auto& [robot, session] : site.members) members[Id(robot)] = Session(session);
     site.members = std::move(members);
-    std::set<std::uint64_t> fragments;
-    for (const std::uint64_t session : site.fragments) fragments.insert(Session(session));
-    site.fragments = std::move(fragments);
-    std::set<std::uint64_t> merged;
-    for (const std::uint64_t session : site.merged) merged.insert(Session(session));
-    site.merged = std::move(merged);
+    for (auto* const sessions : {&site.fragments, &site.merged, &site.kept_apart}) {
+      std::set<std::uint64_t> renamed;
+      for (const std::uint64_t session : *sessions) renamed.insert(Session(session));
+      *sessions = std::move(renamed);
+    }
     for (std::uint64_t& session : site.past) session = Session(session);
     DropAnchors(site, [this](std::uint64_t session) { return !sessions_.contains(session); });
     for (auto& [edit, anchors] : site.anchors)

@@ -229,6 +229,7 @@ class Merge {
     site.switches.insert(completed_.begin(), completed_.end());
     site.members.insert(from_.site.members.begin(), from_.site.members.end());
     site.fragments.insert(from_.site.fragments.begin(), from_.site.fragments.end());
+    site.kept_apart.insert(from_.site.kept_apart.begin(), from_.site.kept_apart.end());
     site.past.insert(site.past.end(), from_.site.past.begin(), from_.site.past.end());
     site.merged.insert(from_.site.merged.begin(), from_.site.merged.end());
     if (auto added = AddEdits(); !added) return added;

@@ -84,6 +84,52 @@ TEST(Joining, ARobotWithoutAStartIsLocalizedOnceAJobHasJoinedItAndNotBefore) {
   EXPECT_EQ(InfoOf(house).epoch, 2U);
 }
 
+// A person has gone back to the version before it was joined. Neither its own way nor that of another robot brings it
+// back, also after a restart, until a person asks for a job.
+TEST(Joining, ARobotThatAPersonHasTakenOutOfTheMapStaysOutWhereAnotherIsJoined) {
+  const TempDirectory directory;
+  constexpr ClientId kThird = 9;
+  RingRobot first = FirstRobot(), second("r2", kOther, 16.0, 70.0), third("r3", kThird, 8.0, 50.0);
+  const auto wait_joined = [](WholeServer& house) {
+    ASSERT_TRUE(house.WaitFor([&] { return JoinedBy(house).has_value(); }));
+    ASSERT_TRUE(house.WaitFor([&] { return InfoOf(house).enabled_version == JoinedBy(house)->map_version; }));
+  };
+  {
+    StoredServer server(directory.path(), JoiningOptions(true));
+    WholeServer& house = server.house();
+    first.Open(house);
+    first.Drive(house, first.left());
+    second.Open(house);
+    second.Drive(house, 200);
+    ASSERT_NO_FATAL_FAILURE(wait_joined(house));
+    second.Drive(house, 5);
+    ASSERT_TRUE(second.LastPose(house).localized);
+    ASSERT_TRUE(Enable(house, 1).status.ok());
+    second.Drive(house, 5);
+    ASSERT_EQ(second.LastPose(house).reason, PoseReason::kNotJoined);
+  }
+  StoredServer server(directory.path(), JoiningOptions(true));
+  WholeServer& house = server.house();
+  second.SayStarted(house);
+  second.Drive(house, 100);
+  third.Open(house);
+  third.Drive(house, third.left() - 10);
+  ASSERT_NO_FATAL_FAILURE(wait_joined(house));
+  third.Drive(house, 5);
+  EXPECT_TRUE(third.LastPose(house).localized);
+  second.Drive(house, 5);
+  EXPECT_EQ(second.LastPose(house).reason, PoseReason::kNotJoined);
+
+  Request smooth = About(RequestKind::kJobSubmit);
+  smooth.enable = true;
+  const Reply submitted = house.Ask(smooth);
+  ASSERT_EQ(submitted.jobs.size(), 1U) << submitted.status.message;
+  const Job job = house.WaitJob(submitted.jobs[0].id);
+  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+  second.Drive(house, 5);
+  EXPECT_TRUE(second.LastPose(house).localized) << job.message;
+}
+
 TEST(Joining, TheMapIsTheSameWithAndWithoutAFragment) {
   const auto map_of = [](bool with_fragment) {
     WholeServer house(JoiningOptions(false));

@@ -331,6 +331,36 @@ TEST_F(SiteTest, NoAlignmentReplacesTheVersionThatAPersonHasChosen) {
   EXPECT_TRUE(says_so(second));
 }
 
+// A robot that a person has taken out of the map stays out until a person wants it in again.
+TEST_F(SiteTest, AFragmentThatAPersonHasTakenOutIsJoinedOnlyWherePeopleAsk) {
+  const auto enable_by = [this](std::uint32_t version, Site::EnabledBy by, bool apart) {
+    corrections_.clear();
+    std::promise<Result<std::uint32_t>> enabled;
+    site_->Enable(
+        version, [&enabled](Result<std::uint32_t> result) { enabled.set_value(std::move(result)); }, {}, by);
+    Settle();
+    for (auto& [session, correction] : corrections_) {
+      correction.done(
+          {.session = session, .displaced = {}, .change = {.session = session, .chunks = {}}, .fragment = apart});
+    }
+    return enabled.get_future().get();
+  };
+  const auto fragment = std::make_shared<FakeSession>(3, corrections_);
+  site_->Join({.session = 3, .robot = 103, .owner = fragment, .fragment = true});
+  const std::uint32_t apart = AddVersion({{3, {.chunks = {}, .keyframes = 3, .path = {}, .fragment = true}}});
+  const std::uint32_t joined = AddVersion({{3, {.chunks = {{{8, 8}, UniformChunk(100)}}, .keyframes = 3}}});
+  ASSERT_TRUE(enable_by(apart, Site::EnabledBy::kPerson, true));
+  EXPECT_TRUE(site_->kept_apart().empty()) << "it was a fragment before, too";
+  ASSERT_TRUE(enable_by(joined, Site::EnabledBy::kJoin, false));
+  EXPECT_FALSE(site_->MayBeAligned()) << "a robot that is joined changes nothing of what a person has chosen";
+  ASSERT_TRUE(enable_by(apart, Site::EnabledBy::kPerson, true));
+  EXPECT_EQ(site_->kept_apart(), std::set<SessionId>{3});
+  EXPECT_EQ(enable_by(joined, Site::EnabledBy::kJoin, false).error().code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(site_->snapshot()->info.enabled_version, apart);
+  ASSERT_TRUE(enable_by(joined, Site::EnabledBy::kJob, false));
+  EXPECT_TRUE(site_->kept_apart().empty());
+}
+
 // At the end of a server. The last changes were lost where Publish had been asked for before them and still waited.
 TEST_F(SiteTest, WhatChangedLastIsPublishedWhenItCloses) {
   std::promise<void> gate;

@@ -68,6 +68,7 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->tile_version, 90U);
   EXPECT_EQ(site_back->fragments, site.fragments);
   EXPECT_EQ(site_back->past, site.past);
+  EXPECT_EQ(site_back->kept_apart, site.kept_apart);
   EXPECT_EQ(site_back->edits, site.edits);
   EXPECT_EQ(site_back->edits_version, 5U);
   EXPECT_EQ(site_back->anchors, site.anchors);

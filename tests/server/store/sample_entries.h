@@ -111,7 +111,8 @@ inline StoredSite SampleSiteRecord() {
           .anchors = {{4,
                        {.points_then = {{0.5, 0}, {1.5, 0}, {1.5, 1}},
                         .keyframes = {{5, 170, {1, 2, 0.5}, {0.5, 2, 0.5}}, {7, 0, {}, {-0.5, 0, 0}}}}}},
-          .given_up = {.versions = 3, .layers = 2, .sessions = 1}};
+          .given_up = {.versions = 3, .layers = 2, .sessions = 1},
+          .kept_apart = {7}};
 }
 
 }  // namespace cairn::server::testing

@@ -82,6 +82,7 @@ TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   EXPECT_EQ(hall->sessions.at(14).id, 14U);
   EXPECT_EQ(hall->site.members.at(HashName("r2")), 15U);
   EXPECT_EQ(hall->site.fragments, std::set<std::uint64_t>{15});
+  EXPECT_EQ(hall->site.kept_apart, std::set<std::uint64_t>{15});
   EXPECT_EQ(hall->site.past, std::vector<std::uint64_t>{15});
   EXPECT_EQ(hall->layers, std::vector<std::uint64_t>{16});
   EXPECT_EQ(hall->jobs.at(5).job.id, 5U);
@@ -237,6 +238,8 @@ TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {
   ASSERT_TRUE(SplitSite(*store, "lab", {2, 3}, "annex"));
   EXPECT_EQ(ReadSite(*store, "lab")->site.fragments, std::set<std::uint64_t>{1});
   EXPECT_EQ(ReadSite(*store, "annex")->site.fragments, std::set<std::uint64_t>{3});
+  EXPECT_EQ(ReadSite(*store, "lab")->site.kept_apart, std::set<std::uint64_t>{1});
+  EXPECT_EQ(ReadSite(*store, "annex")->site.kept_apart, std::set<std::uint64_t>{3});
   EXPECT_EQ(ReadSite(*store, "lab")->site.past, std::vector<std::uint64_t>{1});
   EXPECT_EQ(ReadSite(*store, "annex")->site.past, std::vector<std::uint64_t>{3});
   const auto lab = ReadSite(*store, "lab"), annex = ReadSite(*store, "annex");

@@ -208,6 +208,7 @@ TEST(MergeSites, AFragmentKeepsItsFrameAndIsOneInTheOtherSiteToo) {
   const auto lab = ReadSite(*store, "lab");
   ASSERT_TRUE(lab);
   EXPECT_EQ(lab->site.fragments, (std::set<std::uint64_t>{12, 13}));
+  EXPECT_EQ(lab->site.kept_apart, (std::set<std::uint64_t>{12, 13}));
   EXPECT_EQ(lab->site.past, (std::vector<std::uint64_t>{12, 13}));
   EXPECT_TRUE(lab->sessions.at(12).fragment);
   EXPECT_FALSE(lab->sessions.at(12).request.has_start);

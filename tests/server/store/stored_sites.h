@@ -116,7 +116,7 @@ inline std::int16_t CellAt(const StoredGrid& grid, int x, int y) {
 inline void MakeFragments(Store& store, const std::string& name, const std::set<std::uint64_t>& sessions) {
   auto contents = ReadSite(store, name);
   ASSERT_TRUE(contents);
-  contents->site.fragments = sessions;
+  contents->site.fragments = contents->site.kept_apart = sessions;
   contents->site.past = {sessions.begin(), sessions.end()};
   RecordChanges changes;
   changes.put.push_back({{RecordKind::kSite, HashName(name), 0}, BytesOf(contents->site)});
