@@ -379,6 +379,26 @@ TEST_F(Lost, WhereTheTrackComesBackIntoTheMapTheRobotIsFoundWithWhatItSawLast) {
   EXPECT_LT(*found_m, kMapFromM + 5.0);  // 9 m later with the whole stretch alone.
 }
 
+// The map shows a metre of the way, so that all along it most of what the robot sees lies beyond its edge.
+TEST_F(Lost, AtTheEdgeOfTheMapFourSearchesThatAgreeFindTheRobot) {
+  const Map map(world_, 20.0, 21.0);
+  Recovery recovery = Make();
+  recovery.BeginNear(KnownAt(0), Pose2{0.6, 0.0, 0.0} * T_track_world_.Inverse());
+  std::optional<double> found_m;
+  std::size_t agreed = 0;
+  for (double way_m = 4.0; way_m < 37.0 && !found_m; way_m += 0.25) {
+    const auto found = Take(recovery, {way_m, 0, 0}, {way_m, 0, 0}, map.searched);
+    if (!found) {
+      agreed = recovery.Unconfirmed().size();
+      continue;
+    }
+    found_m = way_m;
+    EXPECT_NEAR(found->place.T_map_robot.x, way_m, 0.05);
+  }
+  EXPECT_TRUE(found_m);  // Never, if every place must explain most of what is seen.
+  EXPECT_GE(agreed, 3U);
+}
+
 // A robot that turns on one spot for an hour.
 TEST_F(Lost, KeepsABoundedNumberOfScans) {
   const auto bytes_after = [&](int scans) {
