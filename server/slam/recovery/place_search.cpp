@@ -13,6 +13,10 @@ namespace {
 // Places with a smaller share of the best score are none.
 constexpr double kLeastOfBest = 0.5;
 
+std::optional<FoundPlace> PlaceOf(const std::optional<PlaceSearch::Returned>& fit) {
+  return fit ? std::optional(fit->place) : std::nullopt;
+}
+
 // The surface points of the scans, one per cell, in the frame of the last scan.
 std::vector<SurfacePoint> SurfacesSeenBy(std::span<const RecentScan> recent, double cell_m) {
   std::vector<SurfacePoint> surfaces;
@@ -32,30 +36,39 @@ std::vector<SurfacePoint> SurfacesSeenBy(std::span<const RecentScan> recent, dou
 
 PlaceSearch::PlaceSearch(const PlaceSearchOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
                          const PointToLineOptions& align)
-    : options_(options), loop_(loop), check_(check), align_(align) {
-  align_.min_score = options_.min_explained;
-}
+    : options_(options), loop_(loop), check_(check), align_(align) {}
 
 std::optional<FoundPlace> PlaceSearch::Find(const SearchedMap& map, std::span<const RecentScan> recent) {
-  return FindWithin(nullptr, map, recent);
+  return PlaceOf(FindWithin(nullptr, map, recent, usual()));
 }
 
 std::optional<FoundPlace> PlaceSearch::FindNear(const SearchedMap& map, std::span<const RecentScan> recent,
                                                 const Pose2& T_map_robot, double reach_m, double reach_rad) {
-  const SearchWindow window{T_map_robot, std::max(options_.near_m, reach_m),
-                            std::min(kPi, std::max(options_.near_rad, reach_rad))};
-  return FindWithin(&window, map, recent);
+  const SearchWindow window = WindowAround(T_map_robot, reach_m, reach_rad);
+  return PlaceOf(FindWithin(&window, map, recent, usual()));
 }
 
-std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, const SearchedMap& map,
-                                                  std::span<const RecentScan> recent) {
+std::optional<PlaceSearch::Returned> PlaceSearch::FindReturned(const SearchedMap& map,
+                                                               std::span<const RecentScan> recent,
+                                                               const Pose2& T_map_robot, double reach_m,
+                                                               double reach_rad) {
+  const SearchWindow window = WindowAround(T_map_robot, reach_m, reach_rad);
+  return FindWithin(&window, map, recent, {align_.min_score, loop_.max_conflict});
+}
+
+SearchWindow PlaceSearch::WindowAround(const Pose2& T_map_robot, double reach_m, double reach_rad) const {
+  return {T_map_robot, std::max(options_.near_m, reach_m), std::min(kPi, std::max(options_.near_rad, reach_rad))};
+}
+
+std::optional<PlaceSearch::Returned> PlaceSearch::FindWithin(const SearchWindow* window, const SearchedMap& map,
+                                                             std::span<const RecentScan> recent, const Limits& limits) {
   if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::vector<SurfacePoint> surfaces = SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
   const auto unique =
       FindUniquePose(surfaces, index_->pyramid, window != nullptr ? *window : index_->window, loop_.max_rival);
   if (!unique) return std::nullopt;
-  return Fit(map, recent, surfaces, *unique, UniquePoseCovariance());
+  return Fit(map, recent, surfaces, *unique, limits);
 }
 
 void PlaceSearch::Begin(const SearchedMap& map, std::span<const RecentScan> recent,
@@ -73,7 +86,7 @@ PlaceSearch::Ended PlaceSearch::End(const SearchedMap& map, std::span<const Rece
   if (!search.poses.best()) return {};
   const Pose2 T_map_robot = *search.poses.best() * Between(search.T_track_robot, recent.back().T_track_robot);
   const auto best =
-      Fit(map, recent, SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM), T_map_robot, UniquePoseCovariance());
+      PlaceOf(Fit(map, recent, SurfacesSeenBy(recent, options_.cell_scale * kSearchCellM), T_map_robot, usual()));
   return {search.poses.found() ? best : std::nullopt, best};
 }
 
@@ -122,11 +135,13 @@ bool PlaceSearch::FitsElsewhere(const SearchedMap& map, std::span<const RecentSc
   return search.peak().has_value();
 }
 
-std::optional<FoundPlace> PlaceSearch::Fit(const SearchedMap& map, std::span<const RecentScan> recent,
-                                           const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
-                                           const Eigen::Matrix3d& covariance) const {
+std::optional<PlaceSearch::Returned> PlaceSearch::Fit(const SearchedMap& map, std::span<const RecentScan> recent,
+                                                      const std::vector<SurfacePoint>& surfaces,
+                                                      const Pose2& T_map_robot, const Limits& limits) const {
+  PointToLineOptions align = align_;
+  align.min_score = limits.min_explained;
   const MatchResult match =
-      AlignPointsToSurfaces(surfaces, index_->index, {T_map_robot, T_map_robot, covariance}, align_);
+      AlignPointsToSurfaces(surfaces, index_->index, {T_map_robot, T_map_robot, UniquePoseCovariance()}, align);
   if (!match.converged || match.degenerate) return std::nullopt;
   // Every one of the scans, not only the last ones: a place that looks like the true one differs from it somewhere.
   VisibilityCounts all;
@@ -136,8 +151,9 @@ std::optional<FoundPlace> PlaceSearch::Fit(const SearchedMap& map, std::span<con
     all += counts;
     if (&one == &recent.back() && counts.known() < options_.min_compared) return std::nullopt;
   }
-  if (all.contradicted > options_.max_conflict * all.known()) return std::nullopt;
-  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(loop_.sigma_m, kFoundSigmaRad)};
+  if (all.contradicted > limits.max_conflict * all.known()) return std::nullopt;
+  const bool clear = match.score >= options_.min_explained && all.contradicted <= options_.max_conflict * all.known();
+  return Returned{{match.T_ref_curr, match.covariance + PoseCovariance(loop_.sigma_m, kFoundSigmaRad)}, clear};
 }
 
 PlaceSearch::Agreement PlaceSearch::Compare(const SearchedMap& map, const Scan& scan,

@@ -87,6 +87,15 @@ class PlaceSearch {
   [[nodiscard]] std::optional<FoundPlace> FindNear(const SearchedMap& map, std::span<const RecentScan> recent,
                                                    const Pose2& T_map_robot, double reach_m = 0.0,
                                                    double reach_rad = 0.0);
+  struct Returned {
+    FoundPlace place;
+    bool clear = false;  // It is also what FindNear finds.
+  };
+  // As FindNear, for a robot that comes back into the map. Much of what it sees lies where the map shows nothing, so
+  // that no more must be explained than of any scan that is aligned, and as much may contradict as where a loop is
+  // closed. One such place that is not `clear` is no proof.
+  [[nodiscard]] std::optional<Returned> FindReturned(const SearchedMap& map, std::span<const RecentScan> recent,
+                                                     const Pose2& T_map_robot, double reach_m, double reach_rad);
   // All places that may be that of the last of the scans, at most `most`. `go_on` is asked between the searches, each
   // of which is bounded (kMaxBlocks); if it returns false, what was found so far is returned and must not be used.
   // REQUIRES: as Find.
@@ -109,13 +118,20 @@ class PlaceSearch {
                                   const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
 
  private:
+  // What a place must be like: as PlaceSearchOptions.
+  struct Limits {
+    double min_explained = 0.0;
+    double max_conflict = 0.0;
+  };
+  [[nodiscard]] Limits usual() const { return {options_.min_explained, options_.max_conflict}; }
   // The pose near this one at which everything fits.
-  [[nodiscard]] std::optional<FoundPlace> Fit(const SearchedMap& map, std::span<const RecentScan> recent,
-                                              const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
-                                              const Eigen::Matrix3d& covariance) const;
+  [[nodiscard]] std::optional<Returned> Fit(const SearchedMap& map, std::span<const RecentScan> recent,
+                                            const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
+                                            const Limits& limits) const;
   // Over all of the map if there is no window.
-  [[nodiscard]] std::optional<FoundPlace> FindWithin(const SearchWindow* window, const SearchedMap& map,
-                                                     std::span<const RecentScan> recent);
+  [[nodiscard]] std::optional<Returned> FindWithin(const SearchWindow* window, const SearchedMap& map,
+                                                   std::span<const RecentScan> recent, const Limits& limits);
+  [[nodiscard]] SearchWindow WindowAround(const Pose2& T_map_robot, double reach_m, double reach_rad) const;
   const IndexedSurfaces& IndexOf(const SearchedMap& map);
 
   PlaceSearchOptions options_;

@@ -30,6 +30,9 @@ constexpr double kEverywhereEveryM = 4.0;
 // The stretches with which it is looked for near the track, and on how much way with one of them.
 constexpr std::array kStretchesM = {kStretchM, 6.0, 3.0};
 constexpr double kNextStretchM = 0.25;
+// Where the map ends much of what the robot sees is not in it. A place that explains little is believed if so many
+// searches near the track in a row found it, which takes kNextStretchM of way for each, and no other place fitted.
+constexpr std::size_t kAgreeAtTheEdge = 4;
 // Work of the search in the whole map with one scan (PoseSearch; 60,000 blocks take 5 ms). A robot that is probably on
 // its path is waited for by nobody. One that is lost, or may have been carried, is to be found soon.
 constexpr int kBlocksOnPath = 60'000;
@@ -180,18 +183,27 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
                   PlaceSearch::Agreement::kContradicts;
   const bool followed = said_ && T_map_track_.has_value();
   if (contradicted_ && !followed) LeavePath();
-  if (said_) {
-    const auto [reach_m, reach_rad] = followed ? ReachOfTrack() : std::pair(0.0, 0.0);
-    const auto place = search_.FindNear(map, followed ? LastPart() : std::span(std::as_const(recent_)), T_map_robot,
-                                        reach_m, reach_rad);
-    // Farther from where the track leads, one search is no proof.
-    if (place && (!followed || IsNear(T_map_robot, place->T_map_robot) ||
-                  IsConfirmed(place->T_map_robot, recent_.back().travelled_m)))
-      return Found{*place, false};
+  if (followed) {
+    if (const auto place = FindNearTrack(map, T_map_robot)) return Found{*place, false};
+  } else if (said_) {
+    if (const auto place = search_.FindNear(map, recent_, T_map_robot)) return Found{*place, false};
   }
   const auto place = SearchOn(map);
   if (!place) return std::nullopt;
   return Found{*place, T_map_track_ && IsNear(T_map_robot, place->T_map_robot)};
+}
+
+// Where a robot is that was followed to about `T_map_robot`.
+std::optional<FoundPlace> Recovery::FindNearTrack(const SearchedMap& map, const Pose2& T_map_robot) {
+  const auto [reach_m, reach_rad] = ReachOfTrack();
+  const auto returned = search_.FindReturned(map, LastPart(), T_map_robot, reach_m, reach_rad);
+  if (!returned) return std::nullopt;
+  const FoundPlace& place = returned->place;
+  if (returned->clear && IsNear(T_map_robot, place.T_map_robot)) return place;
+  // Farther from where the track leads, one search is no proof.
+  const bool confirmed = IsConfirmed(place.T_map_robot, recent_.back().travelled_m);
+  if (!confirmed || (!returned->clear && unconfirmed_.size() < kAgreeAtTheEdge)) return std::nullopt;
+  return place;
 }
 
 // Searches on in the whole map. Returns the robot's place once two searches agree.

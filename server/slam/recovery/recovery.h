@@ -14,7 +14,8 @@
 //  - The whole map is searched in parts, one with each scan taken, so that no scan takes long. Which parts are done
 //    follows from the scans since it began, so that a restarted server goes on in the same way.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
-//    where the track leads, and elsewhere by two that agree, like all others.
+//    where the track leads, and elsewhere by two that agree, like all others. At the edge of the map, where the place
+//    explains little of what the robot sees, four searches must agree.
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 
@@ -228,6 +229,7 @@ class Recovery {
   void SearchAgain(const SearchedMap& map);
   [[nodiscard]] int BlocksPerScan() const;
   [[nodiscard]] std::optional<FoundPlace> SearchOn(const SearchedMap& map);
+  [[nodiscard]] std::optional<FoundPlace> FindNearTrack(const SearchedMap& map, const Pose2& T_map_robot);
   [[nodiscard]] std::span<const RecentScan> LastPart() const;
   [[nodiscard]] std::pair<double, double> ReachOfTrack() const;
   [[nodiscard]] bool IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const;

@@ -171,6 +171,16 @@ class Lost : public ::testing::Test {
     return recovery.Take({scan.scan, KnownAt(0).T_odom_robot * odometry}, step, scan.points, own);
   }
 
+  // The way along the middle after which a robot that is followed with an error is found; far more if at a wrong place.
+  double FoundAfter(const Map& map) {
+    Recovery recovery = Make();
+    recovery.BeginNear(KnownAt(0), Pose2{0.6, 0.0, 0.0} * T_track_world_.Inverse());
+    for (double way_m = 4.0; way_m < 37.0; way_m += 0.25) {
+      const auto found = Take(recovery, {way_m, 0, 0}, {way_m, 0, 0}, map.searched);
+      if (found) return std::abs(found->place.T_map_robot.x - way_m) < 0.05 ? way_m : 2000.0;
+    }
+    return 1000.0;
+  }
   const test::World world_ = Hall();
   const Pose2 T_track_world_{3.0, -4.0, 1.0};
   std::mt19937_64 rng_{9};
@@ -361,22 +371,11 @@ TEST_F(Lost, IsLookedForWithTheLastStretchOnly) {
   }
 }
 
-// A robot that is followed from where its map shows nothing back into it, with an error that one search does not
-// prove: what it saw before keeps it from being found only for some metres.
+// A robot that is followed from where its map shows nothing back into it, with an error that one search cannot prove.
 TEST_F(Lost, WhereTheTrackComesBackIntoTheMapTheRobotIsFoundWithWhatItSawLast) {
-  constexpr double kMapFromM = 22.0;
-  const Map map(world_, kMapFromM);
-  Recovery recovery = Make();
-  recovery.BeginNear(KnownAt(0), Pose2{0.6, 0.0, 0.0} * T_track_world_.Inverse());
-  std::optional<double> found_m;
-  for (double way_m = 0.0; way_m < 37.0 && !found_m; way_m += 0.25) {
-    const auto found = Take(recovery, {way_m, 0, 0}, {way_m, 0, 0}, map.searched);
-    if (!found) continue;
-    found_m = way_m;
-    EXPECT_NEAR(found->place.T_map_robot.x, way_m, 0.05);
-  }
-  ASSERT_TRUE(found_m);
-  EXPECT_LT(*found_m, kMapFromM + 5.0);  // 9 m later with the whole stretch alone.
+  EXPECT_LT(FoundAfter(Map(world_, 22.0)), 27.0);  // 9 m later with the whole stretch alone.
+  // With a metre of the way in the map: never, if a place must explain most of what the robot sees.
+  EXPECT_LT(FoundAfter(Map(world_, 20.0, 21.0)), 23.0);
 }
 
 // A robot that turns on one spot for an hour.
