@@ -3,13 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <cmath>
 #include <exception>
 #include <optional>
 #include <utility>
 
 #include "common/service/start_pose.h"
-#include "server/maps/localising_tiles.h"
 #include "server/ops/log_context.h"
 #include "server/store/crash_note.h"
 
@@ -248,10 +246,6 @@ Result<void> Roster::Localise(const std::string& robot, bool only, const std::sh
   const auto site = atlas_.Find((*session)->record().state().site);
   const auto map = site != nullptr ? site->snapshot() : nullptr;
   if (map == nullptr || !map->drawn) return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
-  if (!IsSmallEnoughToLocaliseIn(*map))
-    return Fail(StatusCode::kFailedPrecondition, "the map of its site is wider than " +
-                                                     std::to_string(std::lround(slam::KnownGrid::kMostM)) +
-                                                     " m: robots are localised in smaller ones only");
   return (*session)->Localise(map, receipt);
 }
 

@@ -53,8 +53,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
                                         std::shared_ptr<Receipt> receipt = nullptr);
 
   // From now on the robot is only localised in this map, near where it is in the map or, if that is not known,
-  // everywhere (slam::Mapper::LocaliseIn); MapAgain ends that. FAILED_PRECONDITION: the session is ending, or a robot
-  // that is to map again is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
+  // everywhere (slam::Mapper::LocaliseIn); MapAgain ends that. FAILED_PRECONDITION: the session is ending, the map
+  // is too wide, or a robot that is to map again is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
   [[nodiscard]] Result<void> Localise(std::shared_ptr<const MapSnapshot> map,
                                       std::shared_ptr<Receipt> receipt = nullptr);
   [[nodiscard]] Result<void> MapAgain(std::shared_ptr<Receipt> receipt = nullptr);

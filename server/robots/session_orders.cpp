@@ -1,4 +1,6 @@
 // What people and other parts of the server tell a session's estimator to do (session.h).
+#include <cmath>
+#include <string>
 #include <utility>
 
 #include "server/maps/localising_tiles.h"
@@ -59,6 +61,10 @@ bool Session::Post(PlaceFound&& found) {
 
 Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map, std::shared_ptr<Receipt> receipt) {
   if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  if (!IsSmallEnoughToLocaliseIn(*map))
+    return cairn::Fail(StatusCode::kFailedPrecondition, "the map of its site is wider than " +
+                                                            std::to_string(std::lround(slam::KnownGrid::kMostM)) +
+                                                            " m: robots are localised in smaller ones only");
   const KnownMap known{map->info.epoch, map->info.version, map->info.edits_version, SessionRecord::Clock::now()};
   const MutexLock lock(known_map_mutex_);
   if (!queue_.Push(LocaliseWanted{std::move(map), false, std::move(receipt)})) return TooMany();

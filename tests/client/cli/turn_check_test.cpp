@@ -79,7 +79,8 @@ TEST(TurnCheck, TheLogCheckWarns) {
   EXPECT_THAT(Warnings(Drive(0.16)), testing::HasSubstr("s later than the odometry"));
   auto alone = good;
   std::erase_if(alone, [](const LogRecord& record) { return std::holds_alternative<Odometry>(record); });
-  EXPECT_THAT(Warnings(alone), testing::HasSubstr("data sheet")) << "nothing says that it does not turn";
+  EXPECT_THAT(Warnings(alone), testing::HasSubstr("nothing says when the beams"))
+      << "nothing says that it does not turn";
 }
 
 TEST(TurnCheck, AnArrayThatIsTurnedOverTurnsAgainstTheOdometry) {
