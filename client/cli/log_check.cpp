@@ -235,8 +235,8 @@ void LogCheck::CollectLidarFindings() {
          measure});
   const bool slow = r.scans.rate_hz > 0.0 && r.scans.rate_hz < kSlow_hz;
   // Without odometry nothing says that the robot does not turn.
-  const bool turns_itself = r.odometry.count == 0 || r.turned_rad > 1.0;
-  if (!r.beams_timed && slow && r.field_of_view_rad > kFullTurn_rad && turns_itself)
+  const bool may_turn = r.odometry.count == 0 || r.turned_rad > 1.0;
+  if (!r.beams_timed && slow && r.field_of_view_rad > kFullTurn_rad && may_turn)
     report_.findings.push_back(
         {false,
          fmt::format("nothing says when the beams of a turn of up to {:.2f} s were measured", 1.0 / r.scans.rate_hz),

@@ -225,12 +225,6 @@ std::set<SessionId> SmoothJob::KeptApart(const std::string& name) const {
   return site == nullptr ? std::set<SessionId>{} : site->kept_apart();
 }
 
-bool SmoothJob::JoinsKeptApart(const Job& job, const MapVersion& version) const {
-  return std::ranges::any_of(version.parts, [apart = KeptApart(job.site)](const auto& part) {
-    return !part.second.fragment && apart.contains(part.first);
-  });
-}
-
 Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<SessionMaterial>& material,
                                        const JobControl& control) {
   std::vector<std::uint64_t> sessions;
@@ -261,7 +255,8 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
   JobOutcome outcome = std::move(smoothed->outcome);
   if (!smoothed->version) return outcome;
   // It took long; a person may have come meanwhile.
-  if ((smoothed->aligns && !MayAlign(job)) || (job.kind == JobKind::kJoin && JoinsKeptApart(job, *smoothed->version))) {
+  if ((smoothed->aligns && !MayAlign(job)) ||
+      (job.kind == JobKind::kJoin && JoinsOneOf(KeptApart(job.site), *smoothed->version))) {
     outcome.message = "given up for the sake of a person's wish: " + outcome.message;
     return outcome;
   }

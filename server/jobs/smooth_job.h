@@ -71,7 +71,6 @@ class SmoothJob {
   [[nodiscard]] bool MayAlign(const Job& job) const;
   // Sessions of the site that a person has taken out of its map (Site::kept_apart).
   [[nodiscard]] std::set<SessionId> KeptApart(const std::string& site) const;
-  [[nodiscard]] bool JoinsKeptApart(const Job& job, const MapVersion& version) const;
   Result<SmoothedSite> Smooth(const Job& job, const std::vector<SessionMaterial>& material, const JobControl& control);
   Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
 

@@ -19,7 +19,8 @@ class LastLooks {
   // What the session has looked at last counts as looked at by `by`.
   void Replace(SessionId session, SessionId by);
   void Forget(SessionId session);
-  // What the session has drawn in the chunk is drawn again: where it says something else now, it forgets.
+  // What the session had drawn in the chunk was drawn again. Where it says something else now, it does not count any
+  // more as the one that looked last.
   void ForgetWhereDifferent(SessionId session, const slam::GridChunk& before, const slam::GridChunk& now);
 
   // By cell: 0 where nobody is known to be the last, else the number that NumberOf gives the last session.

@@ -6,6 +6,11 @@
 
 namespace cairn::server {
 
+bool JoinsOneOf(const std::set<SessionId>& sessions, const MapVersion& version) {
+  return std::ranges::any_of(
+      version.parts, [&sessions](const auto& part) { return !part.second.fragment && sessions.contains(part.first); });
+}
+
 MapVersions::MapVersions(std::size_t max_versions) : max_versions_(max_versions) {
   versions_[1].info = {.version = 1, .enabled = true, .job = 0, .note = "live"};
 }

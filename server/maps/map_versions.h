@@ -12,6 +12,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "common/service/map_info.h"
@@ -26,6 +27,9 @@ struct MapVersion {
   std::map<SessionId, RobotGrid> parts;
   SmoothedPaths smoothed;
 };
+
+// Whether one of these sessions is joined with the map in the version: not a fragment.
+[[nodiscard]] bool JoinsOneOf(const std::set<SessionId>& sessions, const MapVersion& version);
 
 class MapVersions {
  public:

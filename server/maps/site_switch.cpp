@@ -1,8 +1,6 @@
 // How a site switches to another map version, and gives a session the part of it that it has missed (site.h).
-#include <algorithm>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,12 +39,8 @@ void Site::Begin(std::uint32_t version, Done done, EnabledBy by) {
   if (wanted == nullptr) {
     return done(Fail(StatusCode::kNotFound, "site '" + name_ + "' has no map version " + std::to_string(version)));
   }
-  if (by == EnabledBy::kJoin || by == EnabledBy::kAlignment) {
-    const std::set<SessionId> apart = kept_apart();
-    if (std::ranges::any_of(wanted->parts,
-                            [&apart](const auto& part) { return !part.second.fragment && apart.contains(part.first); }))
-      return done(Fail(StatusCode::kFailedPrecondition, "a person has taken a robot of the version out of the map"));
-  }
+  if ((by == EnabledBy::kJoin || by == EnabledBy::kAlignment) && JoinsOneOf(kept_apart(), *wanted))
+    return done(Fail(StatusCode::kFailedPrecondition, "a person has taken a robot of the version out of the map"));
   if (version == versions_.enabled()) {
     chosen_ = chosen_ || by == EnabledBy::kPerson;
     StoreSite();

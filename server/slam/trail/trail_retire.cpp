@@ -17,7 +17,6 @@ constexpr double kPlaceSigmaRad = 0.01;
 // A relation that is handed over is given up if both its keyframes have so many loops already. Otherwise relations
 // would grow without end in number and, as they repeat each other, in weight.
 constexpr std::size_t kEnoughLoops = 12;
-// Of more scans between keyframes than this the older ones are given up.
 
 // The connected components of a graph of keyframes (union-find).
 class Components {

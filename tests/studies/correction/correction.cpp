@@ -173,11 +173,9 @@ std::vector<std::vector<Pose2>> Solved(const std::vector<slam::MapperSnapshot>& 
     path.reserve(snapshots[i].keyframes.size());
     const Trajectory& truth = fleet.truth(static_cast<int>(i));
     for (const auto& keyframe : snapshots[i].keyframes) {
-      const auto at = std::lower_bound(truth.begin(), truth.end(), keyframe.scan.stamp(),
-                                       [](const StampedPose& pose, Stamp stamp) { return pose.stamp < stamp; });
-      if (at == truth.end() || at->stamp != keyframe.scan.stamp())
-        throw std::runtime_error("a keyframe has no true pose");
-      path.push_back(T_moved_map * at->T_map_robot);
+      const auto T_map_true = PoseOn(truth, keyframe.scan.stamp(), 1.0);
+      if (!T_map_true) throw std::runtime_error("a keyframe has no true pose");
+      path.push_back(T_moved_map * *T_map_true);
     }
   }
   return paths;

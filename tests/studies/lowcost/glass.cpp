@@ -49,11 +49,10 @@ double ShareDrawn(const OccupancyImage& map, const std::vector<sim::Pane>& panes
 
 int CountWrong(const LogRun& run, const Trajectory& truth) {
   int wrong = 0;
-  std::size_t at = 0;
   for (std::size_t i = 0; i < run.online.size(); ++i) {
-    while (at + 1 < truth.size() && truth[at].stamp < run.online[i].stamp) ++at;
-    const auto off = run.online[i].T_map_robot.translation() - truth[at].T_map_robot.translation();
-    wrong += run.localized[i] != 0 && truth[at].stamp == run.online[i].stamp && off.norm() > kWrongM ? 1 : 0;
+    const auto T_map_true = PoseOn(truth, run.online[i].stamp, 1.0);
+    if (run.localized[i] == 0 || !T_map_true) continue;
+    wrong += (run.online[i].T_map_robot.translation() - T_map_true->translation()).norm() > kWrongM ? 1 : 0;
   }
   return wrong;
 }

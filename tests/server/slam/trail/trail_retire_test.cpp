@@ -153,6 +153,16 @@ TEST(TrailRetire, RelationsDoNotGrowWithoutEnd) {
   EXPECT_LE(after_last, after_first + after_first / 4);
 }
 
+// The state of `trail`, written and read.
+void ReadAgain(const Trail& trail, Trail& read) {
+  StateWriter writer;
+  writer(trail);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes);
+  reader(read);
+  ASSERT_TRUE(reader.ok()) << reader.failed();
+}
+
 // Nothing new is seen, so that no keyframe is given up for days.
 TEST(TrailRetire, TheScansOfARobotThatStandsAreBounded) {
   Trail trail(kStepNoise);
@@ -175,13 +185,8 @@ TEST(TrailRetire, TheScansOfARobotThatStandsAreBounded) {
   for (Stamp back = 0; back < most; ++back)
     ASSERT_EQ(scans[scans.size() - 1 - static_cast<std::size_t>(back)].stamp, end - 1 - back);
 
-  StateWriter writer;
-  writer(trail);
-  const std::string bytes = writer.Bytes();
-  StateReader reader(bytes);
   Trail read(kStepNoise);
-  reader(read);
-  ASSERT_TRUE(reader.ok()) << reader.failed();
+  ASSERT_NO_FATAL_FAILURE(ReadAgain(trail, read));
   ASSERT_EQ(read.scans().size(), scans.size());
   for (std::size_t i = 0; i < scans.size(); ++i) ASSERT_EQ(read.scans()[i].stamp, scans[i].stamp);
 }
@@ -190,13 +195,8 @@ TEST(TrailRetire, IsReadAgainAsItWas) {
   Trail trail(kStepNoise);
   DriveOn(trail, 0, 5 * kPerRound);
   trail.Retire(GivingUp(trail, kPerRound, 4 * kPerRound));
-  StateWriter writer;
-  writer(trail);
-  const std::string bytes = writer.Bytes();
-  StateReader reader(bytes);
   Trail read(kStepNoise);
-  reader(read);
-  ASSERT_TRUE(reader.ok()) << reader.failed();
+  ASSERT_NO_FATAL_FAILURE(ReadAgain(trail, read));
   EXPECT_EQ(read.numbers(), trail.numbers());
   DriveOn(trail, 5 * kPerRound, 6 * kPerRound);
   DriveOn(read, 5 * kPerRound, 6 * kPerRound);
